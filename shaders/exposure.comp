@@ -1,0 +1,44 @@
+#version 460
+// Automatic exposure: the log-average luminance of the image, summed in a fixed order so that equal images give equal
+// exposures. One work group; each thread sums a stripe.
+#extension GL_GOOGLE_include_directive : require
+#include "prelude.glsl"
+#include "gbuffer.glsl"
+#include "tonemap.glsl"
+
+layout(local_size_x = 128) in;
+
+shared float sums[128];
+
+void main() {
+    uint lane = gl_LocalInvocationIndex;
+    // Cells are averaged before the logarithm is taken: noise, most of it black pixels, must not raise the exposure.
+    uvec2 cells = min(FC.size, uvec2(EXPOSURE_CELLS));
+    float sum = 0.0;
+    uint n = cells.x * cells.y;
+    [[dont_unroll]] for (uint i = lane; i < n; i += 128) {
+        uvec2 cell = uvec2(i % cells.x, i / cells.x);
+        uvec2 first = cell * FC.size / cells;
+        uvec2 extent = max((cell + 1u) * FC.size / cells - first, uvec2(1));
+        uvec2 points = min(extent, uvec2(8));
+        float mean = 0.0;
+        [[dont_unroll]] for (uint k = 0; k < points.x * points.y; k++) {
+            ivec2 p = ivec2(first + uvec2(k % points.x, k / points.x) * extent / points);
+            vec3 c = accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated) : imageLoad(image_composite, p).rgb;
+            float l = luminance(c);
+            mean += isnan(l) || isinf(l) ? 0.0 : l;
+        }
+        sum += log(max(mean / float(points.x * points.y), LUMINANCE_FLOOR));
+    }
+    sums[lane] = sum;
+    barrier();
+    for (uint half_ = 64; half_ > 0; half_ >>= 1) {
+        if (lane < half_) sums[lane] += sums[lane + half_];
+        barrier();
+    }
+    if (lane == 0) {
+        float wanted = clamp(KEY / exp(sums[0] / float(n)), EXPOSURE_RANGE.x, EXPOSURE_RANGE.y);
+        float before = FC.exposure.at[0];
+        FC.exposure.at[0] = before > 0.0 ? before * pow(wanted / before, FC.exposure_blend) : wanted;
+    }
+}

@@ -1,0 +1,49 @@
+// The images of a view (the thesis's Table 6.4, with numbers in integer images and motion in pixels).
+//
+// | image | holds |
+// |---|---|
+// | albedo | linear reflectance; a: 1 where the ray hit something |
+// | position | world position; distance along the ray |
+// | surface | shading normal and geometric normal (octahedral, 2 x 16 bits), material, light row |
+// | object | global triangle, instance, barycentrics (2 x 16 bits), PVS cluster |
+// | view | direction of the ray |
+// | motion | previous − current image position, pixels, y down |
+// | emission | radiance emitted towards the eye |
+// | direct | irradiance/π by direct light, not multiplied with the albedo |
+// | composite | radiance of the pixel |
+// | mean, compensation | accumulated radiance: see accumulate.comp |
+// | mean_direct, mean_emission | accumulated shares |
+// | display | encoded output |
+#ifndef GBUFFER_GLSL
+#define GBUFFER_GLSL
+
+layout(set = 1, binding = 0, rgba32f) uniform image2D gbuffer_albedo;
+layout(set = 1, binding = 1, rgba32f) uniform image2D gbuffer_position;
+layout(set = 1, binding = 2, rgba32ui) uniform uimage2D gbuffer_surface;
+layout(set = 1, binding = 3, rgba32ui) uniform uimage2D gbuffer_object;
+layout(set = 1, binding = 4, rgba32f) uniform image2D gbuffer_view;
+layout(set = 1, binding = 5, rgba16f) uniform image2D gbuffer_motion;
+layout(set = 1, binding = 6, rgba32f) uniform image2D image_emission;
+layout(set = 1, binding = 7, rgba32f) uniform image2D image_direct;
+layout(set = 1, binding = 8, rgba32f) uniform image2D image_composite;
+layout(set = 1, binding = 9, rgba32f) uniform image2D image_mean;
+layout(set = 1, binding = 10, rgba32f) uniform image2D image_compensation;
+layout(set = 1, binding = 11, rgba32f) uniform image2D image_mean_direct;
+layout(set = 1, binding = 12, rgba32f) uniform image2D image_mean_emission;
+layout(set = 1, binding = 13, rgba8) uniform image2D image_display;
+
+// Octahedral map of a unit vector to 2 x 16 bits (Meyer et al. 2010).
+uint pack_normal(vec3 n) {
+    n /= abs(n.x) + abs(n.y) + abs(n.z);
+    vec2 p = n.z >= 0.0 ? n.xy : (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
+    return packSnorm2x16(p);
+}
+
+vec3 unpack_normal(uint bits) {
+    vec2 p = unpackSnorm2x16(bits);
+    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
+    return normalize(n);
+}
+
+#endif

@@ -1,0 +1,86 @@
+// Addressable random numbers: the same bits as src/scene/sampling.rs, which explains them.
+#ifndef RANDOM_GLSL
+#define RANDOM_GLSL
+
+const uint SEQUENCE_RANDOM = 0;
+const uint DIM_PIXEL = 0;
+const uint DIM_LENS = 1;
+const uint DIM_LIGHT_PICK = 16;
+const uint DIM_LIGHT_POINT = 80;
+const uint DIM_EVERY_LIGHT = 0x10000;
+
+uint pcg(uint x) {
+    uint state = x * 747796405u + 2891336453u;
+    uint word = ((state >> ((state >> 28) + 4u)) ^ state) * 277803737u;
+    return (word >> 22) ^ word;
+}
+
+uint random_key(uint seed, uint pixel, uint dimension) {
+    return pcg(pixel + pcg(dimension + pcg(seed)));
+}
+
+uint laine_karras(uint x, uint seed) {
+    x += seed;
+    x ^= x * 0x6c50b47cu;
+    x ^= x * 0xb82f1e52u;
+    x ^= x * 0xc7afe638u;
+    x ^= x * 0x8d22f6e6u;
+    return x;
+}
+
+uint owen(uint x, uint seed) {
+    return bitfieldReverse(laine_karras(bitfieldReverse(x), seed));
+}
+
+uint sobol1(uint index) {
+    uint v = 1u << 31;
+    uint x = 0;
+    while (index != 0) {
+        if ((index & 1u) == 1u) x ^= v;
+        index >>= 1;
+        v ^= v >> 1;
+    }
+    return x;
+}
+
+float unit_float(uint bits) {
+    return float(bits >> 8) * (1.0 / 16777216.0);
+}
+
+vec2 sample2(uint sequence, uint key, uint index) {
+    if (sequence == SEQUENCE_RANDOM) {
+        uint a = pcg(key ^ pcg(index));
+        return vec2(unit_float(a), unit_float(pcg(a ^ ((key << 16) | (key >> 16)))));
+    }
+    uint shuffled = owen(index, key);
+    uint x = owen(bitfieldReverse(shuffled), pcg(key ^ 0x68bc21ebu));
+    uint y = owen(sobol1(shuffled), pcg(key ^ 0x02e5be93u));
+    return vec2(unit_float(x), unit_float(y));
+}
+
+vec2 sample_disc(vec2 u) {
+    float a = 2.0 * u.x - 1.0;
+    float b = 2.0 * u.y - 1.0;
+    if (a == 0.0 && b == 0.0) return vec2(0.0);
+    float r;
+    float phi;
+    if (abs(a) > abs(b)) {
+        r = a;
+        phi = 0.785398163397448 * (b / a);
+    } else {
+        r = b;
+        phi = 1.570796326794897 - 0.785398163397448 * (a / b);
+    }
+    return vec2(r * cos(phi), r * sin(phi));
+}
+
+vec2 sample_triangle_barycentrics(vec2 u) {
+    if (u.y > u.x) {
+        float x = u.x * 0.5;
+        return vec2(x, u.y - x);
+    }
+    float y = u.y * 0.5;
+    return vec2(u.x - y, y);
+}
+
+#endif

@@ -1,0 +1,183 @@
+// The scene and the frame as buffers behind addresses. Mirrors src/scene/records.rs and src/render/frame_constants.rs;
+// a test compares member offsets.
+#ifndef SCENE_GLSL
+#define SCENE_GLSL
+
+const uint NONE = 0xffffffffu;
+
+struct VertexAttributes {
+    vec3 normal;
+    vec2 uv;
+    uint color;
+};
+
+struct Triangle {
+    uint vertices[3];
+    uint material;
+    uint surface;
+    uint fallback_row;
+};
+
+const uint MATERIAL_ALPHA_TESTED = 1;
+const uint MATERIAL_SKY = 2;
+const uint MATERIAL_TWO_SIDED_EMISSION = 4;
+const uint MATERIAL_CLAMP = 8;
+const uint MATERIAL_SKY_BOX = 16;
+
+struct Material {
+    uint texture_index;
+    uint flags;
+    float alpha_scale;
+    float alpha_offset;
+    vec3 emission;
+    uint emission_texture;
+    uint sky[6];
+};
+
+struct Instance {
+    vec4 object_to_world[3];
+    vec4 world_to_object[3];
+    uint first_triangle;
+    uint mesh;
+    uint identity;
+    uint padding;
+};
+
+const uint LIGHT_TRIANGLE = 0;
+const uint LIGHT_SPHERE = 1;
+const uint LIGHT_SUN = 2;
+const uint LIGHT_DOME = 3;
+const uint LIGHT_TWO_SIDED = 1;
+const uint LIGHT_LINEAR = 2;
+const uint LIGHT_SPOT = 4;
+const uint LIGHT_NO_COSINE = 8;
+
+struct Light {
+    uint kind;
+    uint flags;
+    uint triangle;
+    uint material;
+    vec3 p0;
+    float size;
+    vec3 p1;
+    uint instance;
+    vec3 p2;
+    uint padding;
+    vec3 radiance;
+    uint padding2;
+};
+
+struct BspNode {
+    vec3 normal;
+    float dist;
+    int children[2];
+};
+
+struct LightRow {
+    uint first_run;
+    uint run_count;
+    uint light_count;
+};
+
+struct LightRun {
+    uint first_light;
+    uint count;
+    uint before;
+};
+
+// Size of a texture: queries of the texture itself cost more, and some drivers answer them wrongly for an index that
+// differs between threads.
+struct TextureInfo {
+    uint width;
+    uint height;
+    uint levels;
+};
+
+// Where a mesh's trees begin.
+struct MeshTree {
+    uint cwbvh_node;
+    uint cwbvh_triangle;
+    uint bvh2_node;
+    uint bvh2_triangle;
+    uint bvh2_root;
+    uint first_triangle;
+    uint opaque_count;
+    uint padding;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Positions { vec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Attributes { VertexAttributes at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Triangles { Triangle at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Materials { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lights { Light at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRows { LightRow at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRuns { LightRun at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TextureInfos { TextureInfo at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MeshTrees { MeshTree at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Words4 { uvec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Floats4 { vec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Floats { float at[]; };
+
+// Everything that stays the same for one frame.
+struct FrameConstants {
+    Positions positions;
+    Attributes attributes;
+    Triangles triangles;
+    Materials materials;
+    Instances instances;
+    Lights lights;
+    BspNodes bsp_nodes;
+    LightRows light_rows;
+    LightRuns light_runs;
+    TextureInfos textures;
+    MeshTrees mesh_trees;
+    Words4 cwbvh_nodes;
+    Floats4 cwbvh_triangles;
+    Floats4 bvh2_nodes;
+    Floats4 bvh2_triangles;
+    Floats4 instance_nodes;
+    Counters counters;
+    Floats exposure;
+    Floats focus;
+    Floats srgb;
+    vec3 eye;
+    float half_width;
+    vec3 forward;
+    float half_height;
+    vec3 right;
+    float aperture;
+    vec3 up;
+    float cone;
+    uvec2 size;
+    uint seed;
+    uint sequence;
+    uint instance_count;
+    uint instance_root;
+    uint all_row;
+    uint cull_lights;
+    uint random_lights;
+    uint soft_shadows;
+    uint antialiasing;
+    uint illumination;
+    uint tonemap;
+    uint view;
+    float fixed_exposure;
+    float exposure_blend;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };
+
+// What changes between the passes of a frame.
+layout(push_constant, scalar) uniform Push {
+    Frame frame;
+    uint sample_index;
+    // Samples in the accumulation, this one included; 0 where nothing is accumulated.
+    uint accumulated;
+};
+
+#define FC frame.constants
+
+#endif

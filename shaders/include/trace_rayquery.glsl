@@ -1,0 +1,34 @@
+// Traversal by VK_KHR_ray_query. Geometry 0 of a bottom level is opaque, geometry 1 alpha-tested.
+layout(set = 0, binding = 0) uniform accelerationStructureEXT top_level;
+
+uint global_triangle(uint instance, uint geometry, uint primitive) {
+    Instance i = FC.instances.at[instance];
+    uint first = geometry == 0 ? 0 : FC.mesh_trees.at[i.mesh].opaque_count;
+    return i.first_triangle + first + primitive;
+}
+
+Hit trace(vec3 origin, vec3 direction, float t_max, bool any) {
+    Hit hit;
+    hit.triangle = NONE;
+    hit.t = t_max;
+    rayQueryEXT query;
+    uint flags = any ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
+    rayQueryInitializeEXT(query, top_level, flags, 0xff, origin, 0.0, direction, t_max);
+    while (rayQueryProceedEXT(query)) {
+        if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionTriangleEXT) continue;
+        uint triangle = global_triangle(uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false)),
+                                        uint(rayQueryGetIntersectionGeometryIndexEXT(query, false)),
+                                        uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false)));
+        if (alpha_test(triangle, rayQueryGetIntersectionBarycentricsEXT(query, false))) {
+            rayQueryConfirmIntersectionEXT(query);
+        }
+    }
+    if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
+        hit.t = rayQueryGetIntersectionTEXT(query, true);
+        hit.instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
+        hit.triangle = global_triangle(hit.instance, uint(rayQueryGetIntersectionGeometryIndexEXT(query, true)),
+                                       uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true)));
+        hit.barycentrics = rayQueryGetIntersectionBarycentricsEXT(query, true);
+    }
+    return hit;
+}

@@ -1,0 +1,40 @@
+#version 460
+// Output: exposure, tone map and sRGB encoding, or one of the frame's intermediate images.
+#extension GL_GOOGLE_include_directive : require
+#include "prelude.glsl"
+#include "random.glsl"
+#include "gbuffer.glsl"
+#include "tonemap.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// A colour for a number; black for none.
+vec3 number_colour(uint n) {
+    if (n == NONE) return vec3(0.0);
+    uint h = pcg(n + 1);
+    return vec3(h & 255u, (h >> 8) & 255u, (h >> 16) & 255u) / 255.0;
+}
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (any(greaterThanEqual(pixel, FC.size))) return;
+    ivec2 p = ivec2(pixel);
+    float exposure = FC.fixed_exposure > 0.0 ? FC.fixed_exposure : FC.exposure.at[0];
+    vec3 radiance = accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated)
+                                    : imageLoad(image_composite, p).rgb;
+    if (FC.view == 8) radiance = imageLoad(image_direct, p).rgb;
+    if (FC.view == 9) radiance = imageLoad(image_emission, p).rgb;
+    if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
+    vec3 shown = encode_srgb(clamp(tone_map(clamp(radiance * exposure, vec3(0.0), vec3(1e4)), FC.tonemap), vec3(0.0), vec3(1.0)));
+    uvec4 surface = imageLoad(gbuffer_surface, p);
+    uvec4 object = imageLoad(gbuffer_object, p);
+    vec4 position = imageLoad(gbuffer_position, p);
+    if (FC.view == 1) shown = encode_srgb(clamp(imageLoad(gbuffer_albedo, p).rgb, 0.0, 1.0));
+    if (FC.view == 2) shown = unpack_normal(surface.x) * 0.5 + 0.5;
+    if (FC.view == 3) shown = unpack_normal(surface.y) * 0.5 + 0.5;
+    if (FC.view == 4) shown = vec3(position.w / (position.w + 512.0));
+    if (FC.view == 5) shown = fract(position.xyz / 256.0);
+    if (FC.view == 6) shown = number_colour(object.w);
+    if (FC.view == 7) shown = number_colour(surface.z);
+    imageStore(image_display, p, vec4(shown, 1.0));
+}

@@ -1,0 +1,102 @@
+//! Options that every sub-command takes, and what follows from them.
+
+use super::args::CliError;
+use crate::assets::vfs::{Install, Vfs};
+use crate::console::Cvars;
+use crate::content;
+use crate::engine::{BackendChoice, Engine};
+use crate::gpu::ValidationMode;
+use crate::scene::Scene;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+
+/// Options common to all sub-commands.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Common {
+    /// Folder that holds baseq3 (or baseoa, or paks); switches automatic discovery off
+    #[arg(long, global = true, value_name = "DIR")]
+    pub basepath: Option<PathBuf>,
+    /// Mod folder searched before the base game
+    #[arg(long, global = true, value_name = "DIR")]
+    pub game: Option<String>,
+    /// How to trace: auto, rayquery, bvh or cpu (the same as +set rt_backend)
+    #[arg(long, global = true, value_name = "NAME")]
+    pub backend: Option<String>,
+    /// GPU to use: its number or part of its name
+    #[arg(long, global = true, value_name = "INDEX|NAME", allow_hyphen_values = true)]
+    pub device: Option<String>,
+    /// Seed of all random numbers (the same as +set rt_seed)
+    #[arg(long, global = true, value_name = "N", allow_hyphen_values = true)]
+    pub seed: Option<String>,
+}
+
+impl Common {
+    /// Puts options that stand for variables into them.
+    pub fn apply(&self, cvars: &mut Cvars) -> Result<(), CliError> {
+        let pairs = [("rt_backend", &self.backend), ("rt_seed", &self.seed)];
+        for (name, value) in pairs {
+            if let Some(value) = value {
+                let note = cvars.set(name, value).map_err(|e| CliError::Usage(e.to_string()))?;
+                note.into_iter().for_each(|n| eprintln!("{n}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Mounts the game files.
+    pub fn files(&self) -> Result<Vfs, CliError> {
+        let installs = match &self.basepath {
+            Some(path) if !path.is_dir() => {
+                return Err(CliError::Failed(format!("--basepath {} is no folder", path.display())));
+            }
+            Some(path) => vec![Install::at(path, self.game.as_deref())],
+            None => Install::discover(self.game.as_deref()),
+        };
+        let files = Vfs::mount(&installs, content::embedded::EMBEDDED);
+        for warning in &files.warnings {
+            eprintln!("warning: {warning}");
+        }
+        Ok(files)
+    }
+
+    /// Chooses what traces, and says so.
+    pub fn engine(&self, cvars: &Cvars) -> Result<Engine, CliError> {
+        let choice = BackendChoice::from_word(&cvars.get("rt_backend").unwrap_or_default());
+        let choice = Engine::choose(choice, self.device.as_deref(), ValidationMode::Off).map_err(CliError::failed)?;
+        eprintln!("{}", choice.line);
+        Ok(choice.engine)
+    }
+
+    /// Loads a map and tells what is missing.
+    pub fn scene(&self, map: &str) -> Result<Scene, CliError> {
+        let files = self.files()?.focused_on(map);
+        let scene = Scene::load(&files, map).map_err(CliError::failed)?;
+        report_warnings(&scene);
+        Ok(scene)
+    }
+}
+
+/// Warnings of a map that are told one by one.
+const WARNINGS_SHOWN: usize = 5;
+
+fn report_warnings(scene: &Scene) {
+    for warning in scene.warnings.iter().take(WARNINGS_SHOWN) {
+        eprintln!("warning: {}: {warning}", scene.name);
+    }
+    if let Some(more @ 1..) = scene.warnings.len().checked_sub(WARNINGS_SHOWN) {
+        eprintln!(
+            "warning: {}: and {more} more (see `q3rays info {}`)",
+            scene.name, scene.name
+        );
+    }
+}
+
+/// A bar of `steps` steps on a terminal, nothing in a pipe.
+pub fn progress(steps: u64, what: &str) -> ProgressBar {
+    let bar = ProgressBar::new(steps);
+    if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent}% {eta}") {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar.set_message(what.to_owned());
+    bar
+}

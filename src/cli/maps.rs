@@ -1,0 +1,18 @@
+//! `q3rays maps`
+
+use super::args::CliResult;
+use super::common::Common;
+
+/// Arguments of `maps`.
+#[derive(clap::Args)]
+pub struct Args {}
+
+/// Lists the maps found, and where.
+pub fn run(common: &Common, _: &Args) -> CliResult {
+    let maps = common.files()?.maps();
+    let width = maps.iter().map(|m| m.name.len()).max().unwrap_or(0);
+    for map in &maps {
+        println!("{:width$}  {}", map.name, map.place);
+    }
+    Ok(())
+}

@@ -1,0 +1,207 @@
+//! `q3rays render`
+
+use super::args::{CliError, CliResult};
+use super::common::{Common, progress};
+use crate::console::Cvars;
+use crate::console::settings::settings;
+use crate::engine::Job;
+use crate::output::{OutputError, atomic, exr_file, png_file};
+use crate::render::film::{Aovs, Film};
+use crate::render::settings::Settings;
+use crate::render::tonemap::{automatic_exposure, display};
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::spawns::{overview, view};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `render`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Map name
+    map: String,
+    /// Eye and angles: X,Y,Z,PITCH,YAW[,ROLL] (units, degrees)
+    #[arg(
+        long,
+        value_name = "X,Y,Z,PITCH,YAW[,ROLL]",
+        allow_hyphen_values = true,
+        conflicts_with = "spawn"
+    )]
+    camera: Option<String>,
+    /// Spawn point to look from, counted from 0
+    #[arg(long, value_name = "N")]
+    spawn: Option<usize>,
+    /// Horizontal field of view, degrees
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    fov: Option<String>,
+    /// Image size
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Average N independent samples per pixel (default 32)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Number of the first sample, for runs that are merged later
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    first_sample: u32,
+    /// Image to write: .png or .exr
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Folder for the intermediate images as EXR
+    #[arg(long, value_name = "DIR")]
+    aov: Option<PathBuf>,
+}
+
+/// Largest image edge, pixels: what random-number addresses and GPUs hold.
+const MAX_EDGE: u32 = 16_384;
+
+/// Parses `WxH`.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let parsed = text
+        .split_once(['x', 'X'])
+        .and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
+    match parsed {
+        Some((w, h)) if (1..=MAX_EDGE).contains(&w) && (1..=MAX_EDGE).contains(&h) => Ok((w, h)),
+        Some(_) => Err(format!("edges must be 1 to {MAX_EDGE} pixels")),
+        None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_owned()),
+    }
+}
+
+/// The view that was asked for.
+pub fn camera(scene: &Scene, camera: Option<&str>, spawn: Option<usize>, fov: f32) -> Result<Camera, CliError> {
+    if let Some(text) = camera {
+        let numbers: Vec<f32> = text
+            .split(',')
+            .map(|n| n.trim().parse::<f32>().ok().filter(|x| x.is_finite()))
+            .collect::<Option<_>>()
+            .unwrap_or_default();
+        let ([x, y, z, pitch, yaw], roll) = match numbers[..] {
+            [x, y, z, pitch, yaw] => ([x, y, z, pitch, yaw], 0.0),
+            [x, y, z, pitch, yaw, roll] => ([x, y, z, pitch, yaw], roll),
+            _ => {
+                return Err(CliError::Usage(format!(
+                    "--camera takes five or six numbers X,Y,Z,PITCH,YAW[,ROLL], not \"{text}\""
+                )));
+            }
+        };
+        return Ok(Camera {
+            eye: [x, y, z],
+            pitch,
+            yaw,
+            roll,
+            fov,
+        });
+    }
+    match (scene.spawns.get(spawn.unwrap_or(0)), scene.spawns.len()) {
+        (Some(s), _) => Ok(view(s, fov)),
+        (None, 0) if spawn.is_none() => {
+            eprintln!("warning: {} has no spawn point; looking from its middle", scene.name);
+            Ok(overview(&scene.bsp, fov))
+        }
+        (None, n) => Err(CliError::Failed(format!(
+            "{} has {n} spawn points, so there is no number {}",
+            scene.name,
+            spawn.unwrap_or(0)
+        ))),
+    }
+}
+
+fn write_image(path: &Path, film: &Film, settings: &Settings) -> Result<(), OutputError> {
+    let extension = path.extension().map(|e| e.to_ascii_lowercase());
+    match extension.as_ref().and_then(|e| e.to_str()) {
+        Some("exr") => exr_file::write_film(path, film, &[]),
+        Some("png") => {
+            let exposure = if settings.exposure > 0.0 {
+                settings.exposure
+            } else {
+                automatic_exposure(&film.mean, film.width, film.height)
+            };
+            let pixels: Vec<_> = film
+                .mean
+                .iter()
+                .map(|p| display(*p, exposure, settings.tonemap))
+                .collect();
+            png_file::write(path, film.width, film.height, &pixels)
+        }
+        _ => Err(OutputError::Extension { path: path.to_owned() }),
+    }
+}
+
+fn write_aovs(folder: &Path, film: &Film, aovs: &Aovs) -> Result<(), OutputError> {
+    std::fs::create_dir_all(folder).map_err(|source| OutputError::Write {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let one = |name: &str, values: &[f32]| vec![(name.to_owned(), values.to_vec())];
+    let dark = vec![[0.0; 3]; film.mean.len()];
+    for (name, planes) in [
+        ("albedo", exr_file::rgb(&aovs.albedo)),
+        ("normal", exr_file::xyz(&aovs.normal)),
+        ("geo_normal", exr_file::xyz(&aovs.geo_normal)),
+        ("depth", one("Z", &aovs.depth)),
+        ("position", exr_file::xyz(&aovs.position)),
+        ("motion", exr_file::xy(&aovs.motion)),
+        ("cluster", one("Y", &aovs.cluster)),
+        ("material", one("Y", &aovs.material)),
+        ("direct", exr_file::rgb(&film.direct)),
+        ("indirect", exr_file::rgb(&dark)),
+        ("emission", exr_file::rgb(&film.emission)),
+        ("transparent", exr_file::rgb(&dark)),
+    ] {
+        exr_file::write(
+            &folder.join(format!("{name}.exr")),
+            film.width,
+            film.height,
+            planes,
+            &[],
+        )?;
+    }
+    Ok(())
+}
+
+/// Renders one view.
+pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
+    if let Some(fov) = &args.fov {
+        let note = cvars.set("cg_fov", fov).map_err(|e| CliError::Usage(e.to_string()))?;
+        note.into_iter().for_each(|n| eprintln!("{n}"));
+    }
+    let known = args
+        .out
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr"));
+    if !known {
+        return Err(CliError::Usage(OutputError::Extension { path: args.out }.to_string()));
+    }
+    // An output that cannot be written is told before the work is done, not after it.
+    atomic::create_parent(&args.out).map_err(CliError::failed)?;
+    let scene = common.scene(&args.map)?;
+    let settings = settings(&cvars);
+    let camera = camera(
+        &scene,
+        args.camera.as_deref(),
+        args.spawn,
+        cvars.number("cg_fov") as f32,
+    )?;
+    let spp = args.spp.unwrap_or(32);
+    let range = args.first_sample..args.first_sample.saturating_add(spp);
+    let engine = common.engine(&cvars)?;
+    let prepared = engine.prepare(&scene).map_err(CliError::failed)?;
+    let bar = progress(1000, &args.map);
+    let job = Job {
+        camera: &camera,
+        size: args.size,
+        settings: &settings,
+        range,
+    };
+    let (film, _) = prepared
+        .accumulate(job, &|share| bar.set_position((share * 1000.0) as u64))
+        .map_err(CliError::failed)?;
+    bar.finish_and_clear();
+    if film.non_finite() > 0 {
+        eprintln!("warning: {} pixels are not finite", film.non_finite());
+    }
+    write_image(&args.out, &film, &settings).map_err(CliError::failed)?;
+    if let Some(folder) = &args.aov {
+        let aovs = prepared.aovs(&camera, args.size, &settings).map_err(CliError::failed)?;
+        write_aovs(folder, &film, &aovs).map_err(CliError::failed)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,5 @@
+//! The content we ship, made by code: the show-case map, its shaders and its textures.
+
+pub mod embedded;
+pub mod showcase;
+pub mod textures;

@@ -1,0 +1,102 @@
+//! The table of all compute shaders, and how to get at their compiled form.
+//!
+//! Ordinary builds embed `shaders/spirv/NAME.spv`. With the feature `compile-shaders` nothing is embedded: shaders are
+//! compiled from `shaders/` when asked for, so that a new entry can be built and an edited one reloaded.
+
+use super::GpuError;
+
+/// One compiled form of one source file.
+#[derive(Clone, Copy, Debug)]
+pub struct ShaderEntry {
+    /// Name of the compiled form: `shaders/spirv/NAME.spv`.
+    pub name: &'static str,
+    /// The source file, relative to `shaders/`.
+    pub source: &'static str,
+    /// Macros defined for this form, with their values.
+    pub defines: &'static [(&'static str, &'static str)],
+}
+
+macro_rules! shader_table {
+    ($($name:literal: $source:literal [$($define:literal = $value:literal),*];)*) => {
+        /// All compiled forms.
+        pub const SHADERS: &[ShaderEntry] =
+            &[$(ShaderEntry { name: $name, source: $source, defines: &[$(($define, $value)),*] }),*];
+
+        #[cfg(not(feature = "compile-shaders"))]
+        fn embedded(name: &str) -> Option<&'static [u8]> {
+            match name {
+                $($name => Some(include_bytes!(concat!(
+                    env!("CARGO_MANIFEST_DIR"), "/shaders/spirv/", $name, ".spv"
+                ))),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+shader_table! {
+    "primary_bvh": "primary.comp" ["TRACE_BVH2" = "1"];
+    "primary_rayquery": "primary.comp" ["TRACE_RAYQUERY" = "1"];
+    "direct_bvh": "direct.comp" [];
+    "direct_rayquery": "direct.comp" ["TRACE_RAYQUERY" = "1"];
+    "focus_bvh": "focus.comp" ["TRACE_BVH2" = "1"];
+    "focus_rayquery": "focus.comp" ["TRACE_RAYQUERY" = "1"];
+    "composite": "composite.comp" [];
+    "exposure": "exposure.comp" [];
+    "tone_map": "tone_map.comp" [];
+    "test_fill": "test/fill.comp" [];
+    "test_fill_squares": "test/fill.comp" ["SQUARES" = "1"];
+    "test_image": "test/image.comp" [];
+    "test_ray_query": "test/ray_query.comp" [];
+}
+
+/// The SPIR-V words of the shader `name`.
+///
+/// # Errors
+/// [`GpuError::Shader`] if it is not in the table, or (with `compile-shaders`) does not compile.
+#[cfg(not(feature = "compile-shaders"))]
+pub fn load_spirv(name: &str) -> Result<Vec<u32>, GpuError> {
+    let bytes = embedded(name).ok_or_else(|| not_in_table(name))?;
+    super::spirv_words(name, bytes)
+}
+
+/// The SPIR-V words of the shader `name`, compiled now from its source.
+///
+/// # Errors
+/// [`GpuError::Shader`] if it is not in the table or does not compile, [`GpuError::Io`] if a file is not there.
+#[cfg(feature = "compile-shaders")]
+pub fn load_spirv(name: &str) -> Result<Vec<u32>, GpuError> {
+    let entry = SHADERS
+        .iter()
+        .find(|entry| entry.name == name)
+        .ok_or_else(|| not_in_table(name))?;
+    super::shader_compiler::compile_entry(&super::shader_compiler::source_root(), entry)
+}
+
+fn not_in_table(name: &str) -> GpuError {
+    GpuError::Shader {
+        name: name.into(),
+        log: "it is not in the table of shaders".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique() {
+        for (index, entry) in SHADERS.iter().enumerate() {
+            assert!(
+                SHADERS[..index].iter().all(|other| other.name != entry.name),
+                "{}",
+                entry.name
+            );
+        }
+    }
+
+    #[test]
+    fn unknown_names_are_errors() {
+        assert!(matches!(load_spirv("no such shader"), Err(GpuError::Shader { .. })));
+    }
+}

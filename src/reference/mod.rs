@@ -1,0 +1,14 @@
+//! The CPU tracer: an independent oracle for the shaders, and what runs where there is no Vulkan.
+//!
+//! It follows the same estimators with the same random numbers as `shaders/`, file by file; intersections and sums are
+//! done in double precision.
+
+pub mod direct;
+pub mod light_sample;
+pub mod primary;
+pub mod renderer;
+pub mod surface;
+pub mod texture;
+pub mod trace;
+
+pub use renderer::CpuRenderer;

@@ -1,0 +1,286 @@
+//! Trees in the shaders' layouts: see `shaders/include/trace_cwbvh.glsl` and `trace_bvh2.glsl`.
+
+use crate::scene::bvh::{BvhQuality, mesh_triangles};
+use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED};
+use crate::scene::static_geometry::{Geometry, Mesh};
+use crate::scene::{Scene, bvh};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::{build_bvh2, build_bvh2_from_tris};
+use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
+use rayon::prelude::*;
+use std::time::Duration;
+use thiserror::Error;
+
+/// Entries of the shaders' traversal stacks.
+const CWBVH_STACK: usize = 24;
+const BVH2_STACK: usize = 64;
+const INSTANCE_STACK: usize = 24;
+/// A leaf reference of the binary tree: 27 bits of triangle number.
+const BVH2_LEAF: u32 = 1 << 31;
+const BVH2_MOST_TRIANGLES: usize = 1 << 27;
+/// Most triangles in a leaf of the binary tree.
+const BVH2_LEAF_SIZE: u32 = 8;
+const ALPHA_TESTED_BIT: u32 = 1 << 31;
+
+/// A tree that the shaders' fixed stacks or references cannot hold.
+#[derive(Debug, Error, PartialEq)]
+pub enum TreeError {
+    #[error("map \"{map}\": the {tree} tree of mesh {mesh} is {depth} levels deep; the tracer's stack holds {most}")]
+    Depth {
+        map: String,
+        tree: &'static str,
+        mesh: usize,
+        depth: usize,
+        most: usize,
+    },
+    #[error("map \"{map}\" has {count} triangles; the tracer can address {most}")]
+    Triangles { map: String, count: usize, most: usize },
+}
+
+/// `struct MeshTree`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeshTree {
+    pub cwbvh_node: u32,
+    pub cwbvh_triangle: u32,
+    pub bvh2_node: u32,
+    pub bvh2_triangle: u32,
+    pub bvh2_root: u32,
+    pub first_triangle: u32,
+    pub opaque_count: u32,
+    pub padding: u32,
+}
+
+/// All trees of a scene's meshes.
+#[derive(Default)]
+pub struct MeshTrees {
+    pub records: Vec<MeshTree>,
+    /// Five 16-byte words a node.
+    pub cwbvh_nodes: Vec<[u32; 20]>,
+    /// (v0, id) (e1, 0) (e2, 0) in leaf order.
+    pub cwbvh_triangles: Vec<[f32; 12]>,
+    /// (min, reference) (max, 0) of both children.
+    pub bvh2_nodes: Vec<[f32; 16]>,
+    pub bvh2_triangles: Vec<[f32; 12]>,
+}
+
+struct BuiltMesh {
+    cwbvh: CwBvh,
+    cwbvh_depth: usize,
+    nodes2: Vec<[f32; 16]>,
+    root2: u32,
+    depth2: usize,
+    order2: Vec<u32>,
+}
+
+fn cwbvh_depth(tree: &CwBvh) -> usize {
+    let mut deepest = 0;
+    let mut stack = vec![(0usize, 1usize)];
+    while let Some((at, depth)) = stack.pop() {
+        deepest = deepest.max(depth);
+        let Some(node) = tree.nodes.get(at) else { continue };
+        for i in 0..node.imask.count_ones() as usize {
+            stack.push((node.child_base_idx as usize + i, depth + 1));
+        }
+    }
+    deepest
+}
+
+/// Re-packs a binary tree so that every node holds both children's boxes. `leaf` makes a leaf's reference.
+fn pack_pairs(tree: &Bvh2, leaf: impl Fn(u32, u32) -> u32) -> (Vec<[f32; 16]>, u32, usize) {
+    let Some(root) = tree.nodes.first() else {
+        return (Vec::new(), leaf(0, 1), 0);
+    };
+    if root.is_leaf() {
+        return (Vec::new(), leaf(root.first_index, root.prim_count), 1);
+    }
+    let mut out = vec![[0f32; 16]];
+    let mut deepest = 1;
+    let mut stack = vec![(root.first_index as usize, 0usize, 1usize)];
+    while let Some((children, target, depth)) = stack.pop() {
+        deepest = deepest.max(depth + 1);
+        for side in 0..2 {
+            let child = &tree.nodes[children + side];
+            let reference = if child.is_leaf() {
+                leaf(child.first_index, child.prim_count)
+            } else {
+                out.push([0.0; 16]);
+                let at = out.len() - 1;
+                stack.push((child.first_index as usize, at, depth + 1));
+                at as u32
+            };
+            let b = child.aabb();
+            let words = [
+                b.min.x,
+                b.min.y,
+                b.min.z,
+                f32::from_bits(reference),
+                b.max.x,
+                b.max.y,
+                b.max.z,
+                0.0,
+            ];
+            out[target][side * 8..side * 8 + 8].copy_from_slice(&words);
+        }
+    }
+    (out, 0, deepest)
+}
+
+fn build_mesh(geometry: &Geometry, mesh: &Mesh, quality: BvhQuality) -> BuiltMesh {
+    let triangles = mesh_triangles(geometry, mesh);
+    let params = bvh::build_params(mesh.triangle_count, quality);
+    let mut time = Duration::default();
+    let cwbvh = build_cwbvh_from_tris(&triangles, params, &mut time);
+    let mut params2 = params;
+    params2.max_prims_per_leaf = params2.max_prims_per_leaf.min(BVH2_LEAF_SIZE);
+    let bvh2 = build_bvh2_from_tris(&triangles, params2, &mut time);
+    let (nodes2, root2, depth2) = if triangles.is_empty() {
+        (Vec::new(), BVH2_LEAF, 0)
+    } else {
+        pack_pairs(&bvh2, |first, count| BVH2_LEAF | (count - 1) << 27 | first)
+    };
+    BuiltMesh {
+        cwbvh_depth: cwbvh_depth(&cwbvh),
+        cwbvh,
+        nodes2,
+        root2,
+        depth2,
+        order2: bvh2.primitive_indices,
+    }
+}
+
+impl MeshTrees {
+    /// Builds the trees of all meshes.
+    ///
+    /// # Errors
+    /// [`TreeError`] where a tree is beyond what the shaders can walk.
+    pub fn build(scene: &Scene, quality: BvhQuality) -> Result<Self, TreeError> {
+        let geometry = &scene.geometry;
+        let built: Vec<BuiltMesh> = geometry
+            .meshes
+            .par_iter()
+            .map(|mesh| build_mesh(geometry, mesh, quality))
+            .collect();
+        let mut out = Self::default();
+        for (index, (mesh, b)) in geometry.meshes.iter().zip(built).enumerate() {
+            for (tree, depth, most) in [("8-wide", b.cwbvh_depth, CWBVH_STACK), ("binary", b.depth2, BVH2_STACK)] {
+                if depth > most {
+                    return Err(TreeError::Depth {
+                        map: scene.name.clone(),
+                        tree,
+                        mesh: index,
+                        depth,
+                        most,
+                    });
+                }
+            }
+            out.records.push(MeshTree {
+                cwbvh_node: out.cwbvh_nodes.len() as u32,
+                cwbvh_triangle: out.cwbvh_triangles.len() as u32,
+                bvh2_node: out.bvh2_nodes.len() as u32,
+                bvh2_triangle: out.bvh2_triangles.len() as u32,
+                bvh2_root: b.root2,
+                first_triangle: mesh.first_triangle,
+                opaque_count: mesh.opaque_count,
+                padding: 0,
+            });
+            out.cwbvh_nodes
+                .extend(b.cwbvh.nodes.iter().map(|n| bytemuck::cast::<_, [u32; 20]>(*n)));
+            if mesh.triangle_count == 0 {
+                // A node without children, and one triangle that nothing hits, keep the walks free of special cases.
+                out.cwbvh_nodes.push([0; 20]);
+                out.bvh2_triangles.push([0.0; 12]);
+            }
+            let pack = |i: &u32| packed_triangle(scene, mesh.first_triangle + i);
+            out.cwbvh_triangles.extend(b.cwbvh.primitive_indices.iter().map(pack));
+            out.bvh2_triangles.extend(b.order2.iter().map(pack));
+            out.bvh2_nodes.extend(b.nodes2);
+        }
+        let count = out.bvh2_triangles.len();
+        if count > BVH2_MOST_TRIANGLES {
+            return Err(TreeError::Triangles {
+                map: scene.name.clone(),
+                count,
+                most: BVH2_MOST_TRIANGLES,
+            });
+        }
+        Ok(out)
+    }
+}
+
+fn packed_triangle(scene: &Scene, triangle: u32) -> [f32; 12] {
+    let [a, b, c] = scene.geometry.corners(triangle);
+    let material = &scene.materials[scene.geometry.triangles[triangle as usize].material as usize];
+    let tested = material.flags & MATERIAL_ALPHA_TESTED != 0;
+    let id = triangle | if tested { ALPHA_TESTED_BIT } else { 0 };
+    let (e1, e2) = (b - a, c - a);
+    [
+        a.x,
+        a.y,
+        a.z,
+        f32::from_bits(id),
+        e1.x,
+        e1.y,
+        e1.z,
+        0.0,
+        e2.x,
+        e2.y,
+        e2.z,
+        0.0,
+    ]
+}
+
+/// The binary tree over all instances but the world, and its root reference; children below zero are −1 − instance.
+pub fn instance_tree(
+    geometry: &Geometry,
+    instances: &[Instance],
+    map: &str,
+) -> Result<(Vec<[f32; 16]>, u32), TreeError> {
+    let boxes: Vec<Aabb> = instances
+        .iter()
+        .skip(1)
+        .map(|i| {
+            let mesh = &geometry.meshes[i.mesh as usize];
+            let mut b = Aabb::empty();
+            if mesh.triangle_count == 0 {
+                return Aabb::new(Vec3::splat(1e30).into(), Vec3::splat(1e30).into());
+            }
+            for corner in 0..8 {
+                let pick = |axis: usize| {
+                    if corner >> axis & 1 == 1 {
+                        mesh.bounds.max[axis]
+                    } else {
+                        mesh.bounds.min[axis]
+                    }
+                };
+                let p = crate::reference::trace::point_to_world(i, Vec3::new(pick(0), pick(1), pick(2)));
+                b.extend(p.into());
+            }
+            // Rounding of the transform must not push geometry out of its box.
+            let slack = (b.max.abs().max(b.min.abs()) * 1e-5).into();
+            let grow: Vec3 = slack;
+            Aabb::new(b.min - glam::Vec3A::from(grow), b.max + glam::Vec3A::from(grow))
+        })
+        .collect();
+    if boxes.is_empty() {
+        return Ok((Vec::new(), 0));
+    }
+    let mut params = obvhs::BvhBuildParams::fast_build();
+    params.max_prims_per_leaf = 1;
+    let tree = build_bvh2(&boxes, params, &mut Duration::default());
+    let reference = |first: u32, _count: u32| (-1 - (tree.primitive_indices[first as usize] as i32 + 1)) as u32;
+    let (nodes, root, depth) = pack_pairs(&tree, reference);
+    if depth > INSTANCE_STACK {
+        return Err(TreeError::Depth {
+            map: map.to_owned(),
+            tree: "instance",
+            mesh: 0,
+            depth,
+            most: INSTANCE_STACK,
+        });
+    }
+    Ok((nodes, root))
+}

@@ -1,0 +1,169 @@
+//! The frame, pass by pass.
+
+use super::composite::Composite;
+use super::direct::Direct;
+use super::exposure::Exposure;
+use super::focus::Focus;
+use super::frame_constants::{FrameConstants, Push};
+use super::gbuffer::GBuffer;
+use super::pass::{PassContext, Recorder};
+use super::primary::Primary;
+use super::scene_gpu::SceneGpu;
+use super::settings::Settings;
+use super::tone_map::ToneMap;
+use super::view_state::ViewState;
+use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps};
+use crate::scene::camera::Camera;
+use std::sync::Arc;
+
+/// What a frame shows and how.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameInput {
+    pub camera: Camera,
+    pub settings: Settings,
+    /// Number of the sample that every pixel takes.
+    pub sample_index: u32,
+    /// Samples accumulated with this one; 0 shows this frame alone.
+    pub accumulated: u32,
+    /// Share of the way to the wanted exposure that this frame goes; 1 takes it at once.
+    pub exposure_blend: f32,
+    /// Produce the display image.
+    pub output: bool,
+}
+
+/// All passes, for one backend. Makes frames of any scene and view.
+pub struct FrameRenderer {
+    primary: Primary,
+    focus: Focus,
+    direct: Direct,
+    composite: Composite,
+    exposure: Exposure,
+    tone_map: ToneMap,
+    pub view_layout: Arc<DescriptorLayout>,
+}
+
+impl FrameRenderer {
+    /// Makes the pipelines for scenes of the same device, backend and number of textures as `scene`.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn new(scene: &SceneGpu, cache: Option<&PipelineCache>) -> Result<Self, GpuError> {
+        let view_layout = GBuffer::layout(&scene.device)?;
+        let context = PassContext {
+            device: &scene.device,
+            backend: scene.backend,
+            layouts: [&scene.layout, &view_layout],
+            cache,
+        };
+        Ok(Self {
+            primary: Primary::new(&context)?,
+            focus: Focus::new(&context)?,
+            direct: Direct::new(&context)?,
+            composite: Composite::new(&context)?,
+            exposure: Exposure::new(&context)?,
+            tone_map: ToneMap::new(&context)?,
+            view_layout: view_layout.clone(),
+        })
+    }
+
+    /// Records one frame of a view. `slot` names the frame in flight whose constants and counters may be written.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn record(
+        &self,
+        cmd: &Commands<'_>,
+        timestamps: Option<&Timestamps>,
+        scene: &SceneGpu,
+        view: &mut ViewState,
+        slot: usize,
+        input: &FrameInput,
+    ) -> Result<(), GpuError> {
+        let constants = frame_constants(scene, view, slot, input);
+        view.constants[slot].write(0, &[constants])?;
+        let mut r = Recorder {
+            cmd,
+            tracker: &mut view.tracker,
+            timestamps,
+            scene,
+            gbuffer: &view.gbuffer,
+            push: Push {
+                frame: view.constants[slot].address(),
+                sample_index: input.sample_index,
+                accumulated: input.accumulated,
+            },
+        };
+        if input.settings.aperture > 0.0 && input.settings.focus_distance <= 0.0 {
+            self.focus.record(&mut r, &view.focus)?;
+        }
+        self.primary.record(&mut r, &view.focus)?;
+        self.direct.record(&mut r, &view.counters[slot])?;
+        self.composite.record(&mut r)?;
+        if input.output {
+            self.exposure.record(&mut r, &view.exposure)?;
+            self.tone_map.record(&mut r, &view.exposure)?;
+        }
+        Ok(())
+    }
+}
+
+/// Constants of a frame. A fixed focus distance is written to its buffer here: nothing on the GPU changes it.
+fn frame_constants(scene: &SceneGpu, view: &mut ViewState, slot: usize, input: &FrameInput) -> FrameConstants {
+    let s = &input.settings;
+    if s.focus_distance > 0.0 && view.focus.write(0, &[s.focus_distance]).is_err() {
+        tracing::warn!("the focus distance could not be set");
+    }
+    let size = view.gbuffer.size;
+    let axes = input.camera.axes();
+    let (half_width, half_height) = input.camera.half_extent(size.0, size.1);
+    let lists = if s.cull_lights == 2 { &scene.tight } else { &scene.pvs };
+    FrameConstants {
+        positions: scene.positions.address(),
+        attributes: scene.attributes.address(),
+        triangles: scene.triangles.address(),
+        materials: scene.materials.address(),
+        instances: scene.instances.address(),
+        lights: scene.lights.address(),
+        bsp_nodes: scene.bsp_nodes.address(),
+        light_rows: lists.rows.address(),
+        light_runs: lists.runs.address(),
+        textures: scene.texture_infos.address(),
+        mesh_trees: scene.bvh.mesh_trees.address(),
+        cwbvh_nodes: scene.bvh.cwbvh_nodes.address(),
+        cwbvh_triangles: scene.bvh.cwbvh_triangles.address(),
+        bvh2_nodes: scene.bvh.bvh2_nodes.address(),
+        bvh2_triangles: scene.bvh.bvh2_triangles.address(),
+        instance_nodes: scene.bvh.instance_nodes.address(),
+        counters: view.counters[slot].address(),
+        exposure: view.exposure.address(),
+        focus: view.focus.address(),
+        srgb: scene.srgb_table.address(),
+        eye: input.camera.eye,
+        half_width,
+        forward: axes.forward.into(),
+        half_height,
+        right: axes.right.into(),
+        aperture: s.aperture,
+        up: axes.up.into(),
+        cone: if s.filter_textures {
+            2.0 * half_width / size.0 as f32
+        } else {
+            0.0
+        },
+        size: [size.0, size.1],
+        seed: s.seed,
+        sequence: s.sequence as u32,
+        instance_count: scene.instance_count,
+        instance_root: scene.bvh.instance_root,
+        all_row: scene.all_row,
+        cull_lights: s.cull_lights,
+        random_lights: s.random_lights,
+        soft_shadows: u32::from(s.soft_shadows),
+        antialiasing: u32::from(s.antialiasing),
+        illumination: u32::from(s.illumination),
+        tonemap: s.tonemap as u32,
+        view: s.view,
+        fixed_exposure: s.exposure,
+        exposure_blend: input.exposure_blend,
+    }
+}

@@ -1,0 +1,69 @@
+//! What stays the same for one frame, as the shaders read it. `shaders/include/scene.glsl` is the GLSL side; a test compares
+//! member offsets.
+
+use bytemuck::{Pod, Zeroable};
+
+/// `struct FrameConstants`: addresses first, then the view, then settings.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct FrameConstants {
+    pub positions: u64,
+    pub attributes: u64,
+    pub triangles: u64,
+    pub materials: u64,
+    pub instances: u64,
+    pub lights: u64,
+    pub bsp_nodes: u64,
+    pub light_rows: u64,
+    pub light_runs: u64,
+    pub textures: u64,
+    pub mesh_trees: u64,
+    pub cwbvh_nodes: u64,
+    pub cwbvh_triangles: u64,
+    pub bvh2_nodes: u64,
+    pub bvh2_triangles: u64,
+    pub instance_nodes: u64,
+    pub counters: u64,
+    pub exposure: u64,
+    pub focus: u64,
+    pub srgb: u64,
+    pub eye: [f32; 3],
+    /// Half width of the image plane at distance 1.
+    pub half_width: f32,
+    pub forward: [f32; 3],
+    pub half_height: f32,
+    pub right: [f32; 3],
+    /// Lens radius, units; 0 for a pinhole.
+    pub aperture: f32,
+    pub up: [f32; 3],
+    /// Width of a pixel's cone at distance 1; 0 reads textures at full resolution.
+    pub cone: f32,
+    pub size: [u32; 2],
+    pub seed: u32,
+    pub sequence: u32,
+    pub instance_count: u32,
+    pub instance_root: u32,
+    pub all_row: u32,
+    pub cull_lights: u32,
+    pub random_lights: u32,
+    pub soft_shadows: u32,
+    pub antialiasing: u32,
+    pub illumination: u32,
+    pub tonemap: u32,
+    pub view: u32,
+    /// Multiplier before the tone map; 0: the automatic one.
+    pub fixed_exposure: f32,
+    /// Share of the way to the wanted exposure that one frame goes, in the logarithm.
+    pub exposure_blend: f32,
+}
+
+/// Push constants of every pass.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Push {
+    /// Address of the [`FrameConstants`].
+    pub frame: u64,
+    pub sample_index: u32,
+    /// Samples in the accumulation, this one included; 0 where nothing is accumulated.
+    pub accumulated: u32,
+}

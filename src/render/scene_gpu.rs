@@ -1,0 +1,353 @@
+//! A scene on the GPU: buffers, textures and acceleration structures that any number of views share.
+
+use super::backend::Backend;
+use super::bvh_upload::{MeshTrees, TreeError, instance_tree};
+use crate::assets::image::SRGB_TO_LINEAR;
+use crate::gpu::acceleration::{
+    BottomDesc, BottomLevel, BuildPreference, BuildStatistics, TopInstance, TopLevel, TriangleGeometry,
+};
+use crate::gpu::{
+    Binding, BindingKind, Buffer, DescriptorLayout, DescriptorSets, Device, GpuError, Image, ImageDesc, MemoryKind,
+    SampledTexture, Sampler, SamplerDesc, UploadBatch, Write,
+};
+use crate::scene::Scene;
+use crate::scene::bvh::BvhQuality;
+use crate::scene::records::{Instance, TextureInfo};
+use ash::vk;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Why a scene cannot be put on the GPU or rendered there.
+#[derive(Debug, Error)]
+pub enum RenderError {
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Tree(#[from] TreeError),
+    #[error("map \"{map}\" has {count} textures; this device can bind {most} at once")]
+    Textures { map: String, count: usize, most: u32 },
+}
+
+/// Bytes of staging memory for uploads.
+const STAGING: u64 = 32 << 20;
+
+/// Light lists of one culling level.
+pub struct LightListBuffers {
+    pub rows: Buffer,
+    pub runs: Buffer,
+}
+
+/// Buffers of the own traversal.
+pub struct BvhBuffers {
+    pub mesh_trees: Buffer,
+    pub cwbvh_nodes: Buffer,
+    pub cwbvh_triangles: Buffer,
+    pub bvh2_nodes: Buffer,
+    pub bvh2_triangles: Buffer,
+    pub instance_nodes: Buffer,
+    pub instance_root: u32,
+}
+
+/// Structures of the driver's traversal.
+pub struct DriverStructures {
+    _index_buffer: Buffer,
+    _bottom: Vec<BottomLevel>,
+    pub top: TopLevel,
+    pub statistics: BuildStatistics,
+}
+
+/// Everything of a scene that shaders read.
+pub struct SceneGpu {
+    pub device: Arc<Device>,
+    pub backend: Backend,
+    pub positions: Buffer,
+    pub attributes: Buffer,
+    pub triangles: Buffer,
+    pub materials: Buffer,
+    pub instances: Buffer,
+    pub instance_count: u32,
+    pub lights: Buffer,
+    pub bsp_nodes: Buffer,
+    pub texture_infos: Buffer,
+    /// sRGB byte to linear light.
+    pub srgb_table: Buffer,
+    pub pvs: LightListBuffers,
+    pub tight: LightListBuffers,
+    pub all_row: u32,
+    pub bvh: BvhBuffers,
+    pub driver: Option<DriverStructures>,
+    _textures: Vec<Image>,
+    _sampler: Sampler,
+    pub layout: Arc<DescriptorLayout>,
+    pub sets: DescriptorSets,
+}
+
+fn upload<T: bytemuck::NoUninit>(
+    device: &Arc<Device>,
+    name: &str,
+    data: &[T],
+    usage: vk::BufferUsageFlags,
+) -> Result<Buffer, GpuError> {
+    // A shader may be handed the address of an empty list, so there is always something behind it.
+    let size = (size_of_val(data) as u64).max(256);
+    let usage = usage | vk::BufferUsageFlags::STORAGE_BUFFER;
+    Buffer::new(device, name, size, usage, MemoryKind::DeviceLocal)
+}
+
+struct Uploads {
+    staging: Vec<(Vec<u8>, usize)>,
+}
+
+impl SceneGpu {
+    /// Uploads a scene and builds its acceleration structures.
+    ///
+    /// # Errors
+    /// [`RenderError`] naming what does not fit, or what the device reported.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        backend: Backend,
+        quality: BvhQuality,
+    ) -> Result<Self, RenderError> {
+        let instances: Vec<Instance> = scene.placements.iter().map(|p| p.record(&scene.geometry)).collect();
+        let trees = MeshTrees::build(scene, quality)?;
+        let (instance_nodes, instance_root) = instance_tree(&scene.geometry, &instances, &scene.name)?;
+        let most = device.limits().max_sampled_images_per_stage.min(MAX_TEXTURES);
+        if scene.textures.len() > most as usize {
+            return Err(RenderError::Textures {
+                map: scene.name.clone(),
+                count: scene.textures.len(),
+                most,
+            });
+        }
+        let mut uploads = Uploads { staging: Vec::new() };
+        let mut buffers = Vec::new();
+        let build_input = if device.has_ray_query() {
+            vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+        } else {
+            vk::BufferUsageFlags::empty()
+        };
+        let none = vk::BufferUsageFlags::empty();
+        macro_rules! buffer {
+            ($name:literal, $data:expr, $usage:expr) => {{
+                let data = $data;
+                buffers.push(upload(device, $name, data, $usage)?);
+                uploads
+                    .staging
+                    .push((bytemuck::cast_slice::<_, u8>(data).to_vec(), buffers.len() - 1));
+                buffers.len() - 1
+            }};
+        }
+        let g = &scene.geometry;
+        let positions = buffer!("positions", &g.positions, build_input);
+        let attributes = buffer!("attributes", &g.attributes, none);
+        let triangles = buffer!("triangles", &g.triangles, none);
+        let materials = buffer!("materials", &scene.materials, none);
+        let instance_records = buffer!("instances", &instances, none);
+        let lights = buffer!("lights", &scene.lights.lights, none);
+        let bsp_nodes = buffer!("bsp nodes", &scene.bsp_nodes, none);
+        let pvs_rows = buffer!("light rows", &scene.rows.pvs.rows, none);
+        let pvs_runs = buffer!("light runs", &scene.rows.pvs.runs, none);
+        let tight_rows = buffer!("tight light rows", &scene.rows.tight.rows, none);
+        let tight_runs = buffer!("tight light runs", &scene.rows.tight.runs, none);
+        let infos: Vec<TextureInfo> = scene
+            .textures
+            .iter()
+            .map(|t| TextureInfo {
+                width: t.width,
+                height: t.height,
+                levels: t.levels.len() as u32,
+            })
+            .collect();
+        let texture_infos = buffer!("texture infos", &infos, none);
+        let srgb_table = buffer!("srgb table", &SRGB_TO_LINEAR[..], none);
+        let mesh_trees = buffer!("mesh trees", &trees.records, none);
+        let cwbvh_nodes = buffer!("8-wide nodes", &trees.cwbvh_nodes, none);
+        let cwbvh_triangles = buffer!("8-wide triangles", &trees.cwbvh_triangles, none);
+        let bvh2_nodes = buffer!("binary nodes", &trees.bvh2_nodes, none);
+        let bvh2_triangles = buffer!("binary triangles", &trees.bvh2_triangles, none);
+        let instance_tree_nodes = buffer!("instance nodes", &instance_nodes, none);
+        let indices: Vec<[u32; 3]> = g.triangles.iter().map(|t| t.vertices).collect();
+        let index_buffer = buffer!("indices", &indices, build_input);
+
+        let textures = scene
+            .textures
+            .iter()
+            .map(|t| {
+                Image::new(
+                    device,
+                    &ImageDesc {
+                        name: &t.name,
+                        format: vk::Format::R8G8B8A8_UNORM,
+                        width: t.width,
+                        height: t.height,
+                        mips: t.levels.len() as u32,
+                        usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+                    },
+                )
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut batch = UploadBatch::new(device, STAGING)?;
+        for (bytes, index) in &uploads.staging {
+            batch.buffer(&buffers[*index], 0, bytes)?;
+        }
+        for (image, texture) in textures.iter().zip(&scene.textures) {
+            for (mip, level) in texture.levels.iter().enumerate() {
+                batch.image(image, mip as u32, bytemuck::cast_slice(level))?;
+            }
+        }
+        batch.finish()?;
+
+        let driver = match backend {
+            Backend::RayQuery => Some(build_driver_structures(
+                device,
+                scene,
+                &instances,
+                &buffers[positions],
+                &buffers[index_buffer],
+            )?),
+            Backend::Bvh => None,
+        };
+        let mut take = buffers.into_iter().map(Some).collect::<Vec<_>>();
+        let mut take = |index: usize| -> Result<Buffer, GpuError> {
+            take[index]
+                .take()
+                .ok_or_else(|| GpuError::InvalidInput("a scene buffer is used twice".into()))
+        };
+        let index_buffer = take(index_buffer)?;
+        let driver = driver.map(|(bottom, top, statistics)| DriverStructures {
+            _index_buffer: index_buffer,
+            _bottom: bottom,
+            top,
+            statistics,
+        });
+        let sampler = Sampler::new(device, "texels", &SamplerDesc::default())?;
+        let (layout, sets) = scene_set(device, backend, driver.as_ref(), &textures, &sampler)?;
+        Ok(Self {
+            device: device.clone(),
+            backend,
+            positions: take(positions)?,
+            attributes: take(attributes)?,
+            triangles: take(triangles)?,
+            materials: take(materials)?,
+            instances: take(instance_records)?,
+            instance_count: instances.len() as u32,
+            lights: take(lights)?,
+            bsp_nodes: take(bsp_nodes)?,
+            texture_infos: take(texture_infos)?,
+            srgb_table: take(srgb_table)?,
+            pvs: LightListBuffers {
+                rows: take(pvs_rows)?,
+                runs: take(pvs_runs)?,
+            },
+            tight: LightListBuffers {
+                rows: take(tight_rows)?,
+                runs: take(tight_runs)?,
+            },
+            all_row: scene.rows.all_row,
+            bvh: BvhBuffers {
+                mesh_trees: take(mesh_trees)?,
+                cwbvh_nodes: take(cwbvh_nodes)?,
+                cwbvh_triangles: take(cwbvh_triangles)?,
+                bvh2_nodes: take(bvh2_nodes)?,
+                bvh2_triangles: take(bvh2_triangles)?,
+                instance_nodes: take(instance_tree_nodes)?,
+                instance_root,
+            },
+            driver,
+            _textures: textures,
+            _sampler: sampler,
+            layout,
+            sets,
+        })
+    }
+}
+
+/// Most textures bound at once.
+const MAX_TEXTURES: u32 = 8192;
+
+/// Set 0: the top level (ray queries only) and all textures.
+fn scene_set(
+    device: &Arc<Device>,
+    backend: Backend,
+    driver: Option<&DriverStructures>,
+    textures: &[Image],
+    sampler: &Sampler,
+) -> Result<(Arc<DescriptorLayout>, DescriptorSets), GpuError> {
+    let count = textures.len() as u32;
+    let mut bindings = Vec::new();
+    if backend == Backend::RayQuery {
+        bindings.push(Binding::one(0, BindingKind::AccelerationStructure));
+    }
+    bindings.push(Binding::variable(1, BindingKind::Texture, count.max(1)));
+    let layout = DescriptorLayout::new(device, "scene", &bindings)?;
+    let sets = DescriptorSets::new(&layout, 1, count.max(1))?;
+    let sampled: Vec<_> = textures.iter().map(|image| SampledTexture { image, sampler }).collect();
+    let mut writes = vec![Write::textures(1, 0, &sampled)];
+    if let Some(driver) = driver {
+        writes.push(Write::acceleration_structure(0, &driver.top));
+    }
+    sets.write(0, &writes)?;
+    Ok((layout, sets))
+}
+
+/// Geometry 0 of every bottom level is opaque, geometry 1 alpha-tested; a mesh without triangles is not placed.
+fn build_driver_structures(
+    device: &Arc<Device>,
+    scene: &Scene,
+    instances: &[Instance],
+    positions: &Buffer,
+    indices: &Buffer,
+) -> Result<(Vec<BottomLevel>, TopLevel, BuildStatistics), GpuError> {
+    let g = &scene.geometry;
+    let used: Vec<usize> = (0..g.meshes.len())
+        .filter(|&m| g.meshes[m].triangle_count > 0)
+        .collect();
+    let geometries: Vec<Vec<TriangleGeometry>> = used
+        .iter()
+        .map(|&m| {
+            let mesh = &g.meshes[m];
+            let part = |first: u32, count: u32, opaque: bool| TriangleGeometry {
+                vertices: positions.address(),
+                vertex_stride: 12,
+                vertex_count: g.positions.len() as u32,
+                indices: indices.address() + u64::from(mesh.first_triangle + first) * 12,
+                triangle_count: count,
+                opaque,
+            };
+            vec![
+                part(0, mesh.opaque_count, true),
+                part(mesh.opaque_count, mesh.triangle_count - mesh.opaque_count, false),
+            ]
+        })
+        .collect();
+    let descriptions: Vec<BottomDesc<'_>> = geometries
+        .iter()
+        .map(|geometries| BottomDesc {
+            name: "mesh",
+            geometries,
+            preference: BuildPreference::FastTrace,
+            allow_update: false,
+            compact: true,
+        })
+        .collect();
+    let (bottom, statistics) = BottomLevel::build(device, &descriptions)?;
+    let level_of = |mesh: u32| used.iter().position(|&m| m == mesh as usize);
+    let placed: Vec<TopInstance> = instances
+        .iter()
+        .enumerate()
+        .filter_map(|(index, instance)| {
+            let level = &bottom[level_of(instance.mesh)?];
+            Some(TopInstance {
+                transform: instance.object_to_world,
+                ..TopInstance::new(level, index as u32)
+            })
+        })
+        .collect();
+    let mut top = TopLevel::new(device, "top level", placed.len().max(1) as u32, 1)?;
+    device.submit_once("top level", |cmd| {
+        top.record_build(cmd, &placed, 0)?;
+        Ok(())
+    })?;
+    Ok((bottom, top, statistics))
+}

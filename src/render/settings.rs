@@ -1,0 +1,60 @@
+//! Settings of a frame, independent of where they come from.
+
+use crate::scene::sampling::Sequence;
+
+/// Curve from exposed radiance to the display.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Tonemap {
+    Aces = 0,
+    Reinhard = 1,
+    Clamp = 2,
+}
+
+/// What the estimators and the output stage are asked to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Light the scene; else show albedo.
+    pub illumination: bool,
+    /// 0 all lights, 1 the PVS row, 2 the tight row.
+    pub cull_lights: u32,
+    /// Lights sampled at random per hit; 0: every light of the row.
+    pub random_lights: u32,
+    /// Sample the lights' area; else their centre.
+    pub soft_shadows: bool,
+    /// Jitter inside the pixel.
+    pub antialiasing: bool,
+    /// Lens radius in units; 0: pinhole.
+    pub aperture: f32,
+    /// Distance to the plane in focus in units; 0: under the crosshair.
+    pub focus_distance: f32,
+    pub sequence: Sequence,
+    pub seed: u32,
+    /// Multiplier before the tone map; 0: automatic.
+    pub exposure: f32,
+    pub tonemap: Tonemap,
+    /// Index into [`crate::console::cvars::VIEWS`].
+    pub view: u32,
+    /// Select texture levels by the ray's footprint; else level 0.
+    pub filter_textures: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            illumination: true,
+            cull_lights: 1,
+            random_lights: 1,
+            soft_shadows: true,
+            antialiasing: true,
+            aperture: 0.0,
+            focus_distance: 0.0,
+            sequence: Sequence::Sobol,
+            seed: 0,
+            exposure: 0.0,
+            tonemap: Tonemap::Aces,
+            view: 0,
+            filter_textures: true,
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Exposure and tone map. Counterpart of `shaders/include/tonemap.glsl`.
+
+use super::settings::Tonemap;
+use crate::assets::image::encode_srgb;
+
+/// Luminance that the log-average of an image is brought to.
+pub const KEY: f32 = 0.18;
+/// Radiance below this counts as this much in the log-average, so that black pixels do not blow the exposure up.
+pub const LUMINANCE_FLOOR: f32 = 1e-4;
+/// Range of the automatic exposure.
+pub const EXPOSURE_RANGE: (f32, f32) = (0.05, 64.0);
+
+/// Rec. 709 luminance.
+pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// Cells per image edge whose means enter the log-average: noise, most of it black pixels, must not raise the exposure.
+const EXPOSURE_CELLS: usize = 32;
+
+/// Exposure that brings the log-average of the luminance of 32 x 32 cells to [`KEY`].
+pub fn automatic_exposure(pixels: &[[f32; 3]], width: u32, height: u32) -> f32 {
+    let (w, h) = (width as usize, height as usize);
+    let (nx, ny) = (w.min(EXPOSURE_CELLS), h.min(EXPOSURE_CELLS));
+    let mut sums = vec![(0f64, 0u32); nx * ny];
+    for (i, p) in pixels.iter().enumerate() {
+        let (x, y) = (i % w, i / w);
+        let l = luminance(*p);
+        let cell = &mut sums[y * ny / h * nx + x * nx / w];
+        cell.0 += if l.is_finite() { f64::from(l) } else { 0.0 };
+        cell.1 += 1;
+    }
+    let log = |&(sum, n): &(f64, u32)| (sum / f64::from(n.max(1))).max(f64::from(LUMINANCE_FLOOR)).ln();
+    let average = (sums.iter().map(log).sum::<f64>() / sums.len().max(1) as f64).exp() as f32;
+    (KEY / average).clamp(EXPOSURE_RANGE.0, EXPOSURE_RANGE.1)
+}
+
+fn curve(x: f32, tonemap: Tonemap) -> f32 {
+    match tonemap {
+        // Narkowicz 2015, "ACES Filmic Tone Mapping Curve".
+        Tonemap::Aces => (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14),
+        Tonemap::Reinhard => x / (1.0 + x),
+        Tonemap::Clamp => x,
+    }
+}
+
+/// Display bytes of a radiance.
+pub fn display(radiance: [f32; 3], exposure: f32, tonemap: Tonemap) -> [u8; 3] {
+    radiance.map(|x| {
+        let x = if x.is_finite() {
+            (x * exposure).clamp(0.0, 1e4)
+        } else {
+            0.0
+        };
+        (encode_srgb(curve(x, tonemap).clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
+    })
+}

@@ -1,0 +1,78 @@
+//! What one view keeps between frames: its images, exposure and counters.
+
+use super::frame_constants::FrameConstants;
+use super::gbuffer::GBuffer;
+use crate::gpu::{Buffer, DescriptorLayout, Device, GpuError, MemoryKind, Tracker};
+use crate::reference::direct::RayCounts;
+use ash::vk;
+use std::sync::Arc;
+
+/// Words of the counters buffer: 64 bits each for shadow rays and skipped light samples.
+const COUNTER_WORDS: u64 = 4;
+
+/// State of one view. One scene serves any number of them; each belongs to one caller at a time.
+pub struct ViewState {
+    pub gbuffer: GBuffer,
+    pub tracker: Tracker,
+    /// One set of constants per frame in flight.
+    pub constants: Vec<Buffer>,
+    pub exposure: Buffer,
+    pub focus: Buffer,
+    /// One set of counters per frame in flight, visible to the CPU.
+    pub counters: Vec<Buffer>,
+}
+
+impl ViewState {
+    /// Makes the images of a view.
+    ///
+    /// # Errors
+    /// [`GpuError`], out of memory above all.
+    pub fn new(
+        device: &Arc<Device>,
+        layout: &Arc<DescriptorLayout>,
+        size: (u32, u32),
+        frames_in_flight: usize,
+    ) -> Result<Self, GpuError> {
+        let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let per_frame = |name: &str, size: u64, kind: MemoryKind| {
+            (0..frames_in_flight)
+                .map(|_| Buffer::new(device, name, size, storage, kind))
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let mut exposure = Buffer::new(device, "exposure", 4, storage, MemoryKind::Upload)?;
+        exposure.write(0, &[0f32])?;
+        let mut focus = Buffer::new(device, "focus", 4, storage, MemoryKind::Upload)?;
+        focus.write(0, &[0f32])?;
+        let mut counters = per_frame("counters", COUNTER_WORDS * 4, MemoryKind::Readback)?;
+        for c in &mut counters {
+            c.write(0, &[0u32; COUNTER_WORDS as usize])?;
+        }
+        Ok(Self {
+            gbuffer: GBuffer::new(device, layout, size)?,
+            tracker: Tracker::new(),
+            constants: per_frame(
+                "frame constants",
+                size_of::<FrameConstants>() as u64,
+                MemoryKind::Upload,
+            )?,
+            exposure,
+            focus,
+            counters,
+        })
+    }
+
+    /// Reads and clears the counters of a frame that has ended.
+    ///
+    /// # Errors
+    /// [`GpuError`] where the memory cannot be read.
+    pub fn take_counts(&mut self, slot: usize) -> Result<RayCounts, GpuError> {
+        let words: Vec<u32> = self.counters[slot].read()?;
+        self.counters[slot].write(0, &[0u32; COUNTER_WORDS as usize])?;
+        let pair = |i: usize| u64::from(words[i]) | u64::from(words[i + 1]) << 32;
+        Ok(RayCounts {
+            primary: 0,
+            shadow: pair(0),
+            shadow_skipped: pair(2),
+        })
+    }
+}

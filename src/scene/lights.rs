@@ -1,0 +1,343 @@
+//! The lights that a map's files describe: emissive surfaces, light entities, suns and skies, in luxel units.
+
+use super::clusters::{ClusterMap, LightReach};
+use super::material::{MaterialSource, Visibility};
+use super::records::{
+    LIGHT_DOME, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, LIGHT_TWO_SIDED,
+    Light, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
+};
+use super::static_geometry::Geometry;
+use crate::assets::bsp::{Bounds, Bsp};
+use crate::assets::entities::Entity;
+use crate::assets::shader_script::Sun;
+use glam::{Affine3A, Vec3};
+use std::f32::consts::PI;
+
+/// A point light of N has luxel value 7500·N·cosθ/d².
+const POINT_SCALE: f32 = 7500.0;
+/// Luxel value at distance 0 of a linear light of 1.
+const LINEAR_SCALE: f32 = 7500.0 / 8000.0;
+/// Radius of the sphere that stands for a point light, units: small beside rooms, large enough for soft shadows.
+pub const POINT_RADIUS: f32 = 4.0;
+/// Angular radius of a sun whose script gives none: the real one's, in radians.
+pub const SUN_RADIUS: f32 = 0.2665 * PI / 180.0;
+/// Brightness of a light entity without `light`.
+const DEFAULT_LIGHT: f32 = 300.0;
+
+/// Where a light came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LightSource {
+    EmissiveTriangle,
+    SkyTriangle,
+    PointEntity,
+    SpotEntity,
+    EmissiveSprite,
+    Sun,
+    SkyDome,
+}
+
+/// All lights of a scene: the records, where each came from, and where it can act.
+#[derive(Clone, Debug, Default)]
+pub struct LightTable {
+    pub lights: Vec<Light>,
+    pub sources: Vec<LightSource>,
+    pub reach: Vec<LightReach>,
+}
+
+const BLANK: Light = Light {
+    kind: LIGHT_TRIANGLE,
+    flags: 0,
+    triangle: NONE,
+    material: NONE,
+    p0: [0.0; 3],
+    size: 0.0,
+    p1: [0.0; 3],
+    instance: NONE,
+    p2: [0.0; 3],
+    padding: 0,
+    radiance: [0.0; 3],
+    padding2: 0,
+};
+
+/// Everything that the collection of lights looks at.
+pub struct LightInputs<'a> {
+    pub bsp: &'a Bsp,
+    pub entities: &'a [Entity],
+    pub geometry: &'a Geometry,
+    /// Object to world of each mesh, `None` where no entity places it.
+    pub placements: &'a [Option<Affine3A>],
+    pub sources: &'a [MaterialSource],
+    pub materials: &'a [Material],
+    pub clusters: &'a ClusterMap,
+}
+
+impl LightTable {
+    fn push(&mut self, source: LightSource, light: Light, reach: LightReach) {
+        self.lights.push(light);
+        self.sources.push(source);
+        self.reach.push(reach);
+    }
+
+    /// Number of lights by source.
+    pub fn count(&self, source: LightSource) -> usize {
+        self.sources.iter().filter(|s| **s == source).count()
+    }
+
+    /// Collects the lights in a fixed order: surfaces as they stand in the file, entities, suns, domes.
+    pub fn collect(inputs: &LightInputs) -> Self {
+        let mut table = Self::default();
+        for (index, mesh) in inputs.geometry.meshes.iter().enumerate() {
+            let Some(placement) = inputs.placements[index] else {
+                continue;
+            };
+            let range = mesh.first_triangle..mesh.first_triangle + mesh.triangle_count;
+            table.add_triangles(inputs, range, placement, index != 0);
+        }
+        let rest = inputs.geometry.untraced_from..inputs.geometry.triangles.len() as u32;
+        table.add_triangles(inputs, rest, Affine3A::IDENTITY, false);
+        for entity in inputs.entities.iter().filter(|e| is_light(e)) {
+            table.add_entity(inputs, entity);
+        }
+        table.add_skies(inputs);
+        table
+    }
+
+    fn add_triangles(&mut self, inputs: &LightInputs, range: std::ops::Range<u32>, placement: Affine3A, moves: bool) {
+        let mut sprite_done = u32::MAX;
+        for index in range.clone() {
+            let triangle = inputs.geometry.triangles[index as usize];
+            let material = &inputs.materials[triangle.material as usize];
+            let source = &inputs.sources[triangle.material as usize];
+            let Some(_) = source.surface_light() else { continue };
+            if source.autosprite {
+                if sprite_done != triangle.surface {
+                    sprite_done = triangle.surface;
+                    self.add_sprite(inputs, triangle.surface, range.clone(), placement);
+                }
+                continue;
+            }
+            let [a, b, c] = inputs.geometry.corners(index).map(|p| placement.transform_point3(p));
+            let cross = (b - a).cross(c - a);
+            let area = cross.length() * 0.5;
+            if !(area > 0.0 && area.is_finite()) {
+                continue;
+            }
+            let sky = source.visibility == Visibility::Sky;
+            let two_sided = material.flags & MATERIAL_TWO_SIDED_EMISSION != 0 && !sky;
+            let normal = cross / (2.0 * area);
+            let listed = &inputs.clusters.of_surface[triangle.surface as usize];
+            let clusters = if moves || listed.is_empty() {
+                let mut bounds = Bounds::EMPTY;
+                [a, b, c].into_iter().for_each(|p| bounds.include(p));
+                Some(inputs.clusters.in_box(inputs.bsp, bounds.grown(1.0))).filter(|set| !set.is_empty())
+            } else {
+                Some(listed.clone())
+            };
+            self.push(
+                if sky {
+                    LightSource::SkyTriangle
+                } else {
+                    LightSource::EmissiveTriangle
+                },
+                Light {
+                    flags: if two_sided { LIGHT_TWO_SIDED } else { 0 },
+                    triangle: index,
+                    material: triangle.material,
+                    p0: a.into(),
+                    size: area,
+                    p1: (b - a).into(),
+                    p2: (c - a).into(),
+                    radiance: material.emission,
+                    ..BLANK
+                },
+                LightReach {
+                    clusters,
+                    front: (!two_sided).then(|| (normal, normal.dot(a))),
+                },
+            );
+        }
+    }
+
+    /// An emissive sprite is a point light at the middle of its surface.
+    fn add_sprite(&mut self, inputs: &LightInputs, surface: u32, range: std::ops::Range<u32>, placement: Affine3A) {
+        let mut bounds = Bounds::EMPTY;
+        let mut material = 0;
+        for index in range {
+            let triangle = inputs.geometry.triangles[index as usize];
+            if triangle.surface == surface {
+                material = triangle.material;
+                inputs
+                    .geometry
+                    .corners(index)
+                    .into_iter()
+                    .for_each(|p| bounds.include(p));
+            }
+        }
+        let source = &inputs.sources[material as usize];
+        let Some(value) = source.surface_light() else { return };
+        let centre = placement.transform_point3(bounds.centre());
+        let colour = source.emission_colour();
+        self.add_sphere(inputs, LightSource::EmissiveSprite, centre, value, colour, |_| {});
+    }
+
+    fn add_sphere(
+        &mut self,
+        inputs: &LightInputs,
+        source: LightSource,
+        centre: Vec3,
+        photons: f32,
+        colour: Vec3,
+        shape: impl FnOnce(&mut Light),
+    ) {
+        // Irradiance/π of a sphere of radiance L at distance d is L·r²/d²; it is 7500·N/(255·d²).
+        let radiance = colour * (POINT_SCALE * photons / 255.0 / (POINT_RADIUS * POINT_RADIUS));
+        let mut light = Light {
+            kind: LIGHT_SPHERE,
+            p0: centre.into(),
+            size: POINT_RADIUS,
+            p2: [0.0, 0.0, photons / 255.0],
+            radiance: radiance.into(),
+            ..BLANK
+        };
+        shape(&mut light);
+        if light.flags & LIGHT_LINEAR != 0 {
+            light.radiance = colour.into();
+            light.p2[2] = photons * LINEAR_SCALE / 255.0;
+        }
+        let around = Bounds {
+            min: centre - POINT_RADIUS,
+            max: centre + POINT_RADIUS,
+        };
+        let clusters = inputs
+            .bsp
+            .cluster_at(centre)
+            .map(|_| inputs.clusters.in_box(inputs.bsp, around));
+        self.push(source, light, LightReach { clusters, front: None });
+    }
+
+    fn add_entity(&mut self, inputs: &LightInputs, entity: &Entity) {
+        let photons = entity
+            .number("_light")
+            .or(entity.number("light"))
+            .filter(|&n| n != 0.0)
+            .unwrap_or(DEFAULT_LIGHT)
+            * entity.number("scale").filter(|&s| s != 0.0).unwrap_or(1.0);
+        let raw = entity.vector("_color").unwrap_or(Vec3::ONE);
+        let flags = entity.spawnflags();
+        let colour = if flags & 32 != 0 {
+            raw
+        } else {
+            super::emission::max_one(raw)
+        };
+        let target = entity
+            .get("target")
+            .and_then(|name| inputs.entities.iter().find(|e| e.get("targetname") == Some(name)));
+        let origin = entity.origin();
+        if let Some(target) = target
+            && entity.number("_sun").is_some_and(|s| s != 0.0)
+        {
+            let samples = entity.number("_samples").unwrap_or(1.0).max(1.0);
+            let sun = SunLight {
+                direction: (origin - target.origin()).normalize_or(Vec3::Z),
+                radius: entity.number("_deviance").unwrap_or(0.0).to_radians(),
+                irradiance: colour * (photons / 255.0 / samples),
+            };
+            self.add_sun(&sun);
+            return;
+        }
+        let spot = target.map(|t| t.origin() - origin).filter(|d| *d != Vec3::ZERO);
+        let source = if spot.is_some() {
+            LightSource::SpotEntity
+        } else {
+            LightSource::PointEntity
+        };
+        self.add_sphere(inputs, source, origin, photons, colour, |light| {
+            if let Some(axis) = spot {
+                let radius = entity.number("radius").filter(|&r| r != 0.0).unwrap_or(64.0);
+                light.flags |= LIGHT_SPOT;
+                light.p1 = axis.normalize().into();
+                light.p2[0] = (radius + 16.0) / axis.length();
+            } else if flags & 1 != 0 {
+                light.flags |= LIGHT_LINEAR | LIGHT_NO_COSINE;
+                light.p2[1] = entity.number("fade").filter(|&f| f != 0.0).unwrap_or(1.0) / 255.0;
+            }
+            if flags & 2 != 0 {
+                light.flags |= LIGHT_NO_COSINE;
+            }
+        });
+    }
+
+    fn add_sun(&mut self, sun: &SunLight) {
+        let d = sun.direction;
+        self.push(
+            LightSource::Sun,
+            Light {
+                kind: LIGHT_SUN,
+                p0: d.into(),
+                p1: [d.y.atan2(d.x), d.z.clamp(-1.0, 1.0).asin(), sun.radius.max(SUN_RADIUS)],
+                radiance: sun.irradiance.into(),
+                ..BLANK
+            },
+            LightReach {
+                clusters: None,
+                front: None,
+            },
+        );
+    }
+
+    /// Suns and domes of every sky material that some surface uses.
+    fn add_skies(&mut self, inputs: &LightInputs) {
+        let mut used = vec![false; inputs.sources.len()];
+        for s in &inputs.bsp.surfaces {
+            used[s.shader as usize] = true;
+        }
+        let worldspawn = inputs.entities.iter().find(|e| e.class() == "worldspawn");
+        let no_shader_sun = worldspawn
+            .and_then(|w| w.number("_noshadersun"))
+            .is_some_and(|n| n != 0.0);
+        let mut suns: Vec<Sun> = Vec::new();
+        for (source, _) in inputs.sources.iter().zip(&used).filter(|(_, used)| **used) {
+            for sun in source.suns.iter().filter(|_| !no_shader_sun) {
+                // The same sky under two names (a cloned shader) is one sun.
+                if suns.contains(sun) {
+                    continue;
+                }
+                suns.push(*sun);
+                self.add_sun(&SunLight {
+                    direction: sun.direction(),
+                    radius: sun.deviance_degrees.to_radians(),
+                    irradiance: sun.color.normalize_or_zero() * (sun.intensity / 255.0),
+                });
+            }
+            if let Some(value) = source.sky_light {
+                self.push(
+                    LightSource::SkyDome,
+                    Light {
+                        kind: LIGHT_DOME,
+                        radiance: (source.emission_colour() * (value / 255.0)).into(),
+                        ..BLANK
+                    },
+                    LightReach {
+                        clusters: None,
+                        front: None,
+                    },
+                );
+            }
+        }
+    }
+}
+
+struct SunLight {
+    direction: Vec3,
+    /// Angular radius, radians.
+    radius: f32,
+    /// Irradiance/π at normal incidence.
+    irradiance: Vec3,
+}
+
+fn is_light(entity: &Entity) -> bool {
+    // `lightJunior` lights the grid only; other classes that merely begin with "light" do not exist in the game.
+    let class = entity.class();
+    class.eq_ignore_ascii_case("light") || class.eq_ignore_ascii_case("_light")
+}

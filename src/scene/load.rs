@@ -1,0 +1,174 @@
+//! From a map's files to a scene.
+
+use super::clusters::{ClusterMap, LightRows, bsp_records, build_light_rows};
+use super::entity_geometry::{self, Placement};
+use super::lights::{LightInputs, LightTable};
+use super::material::MaterialSource;
+use super::records::{BspNode, Material};
+use super::spawns::{Spawn, spawns};
+use super::static_geometry::{self, Geometry};
+use super::textures::TextureRequests;
+use crate::assets::bsp::{Bsp, BspError};
+use crate::assets::entities::{self, Entity};
+use crate::assets::image::Texture;
+use crate::assets::shader_script::ShaderLibrary;
+use crate::assets::vfs::search_path::map_path;
+use crate::assets::vfs::{FileSource, VfsError};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Why a map could not be loaded.
+#[derive(Debug, Error)]
+pub enum SceneError {
+    #[error("no map named \"{name}\" was found; `q3rays maps` lists what there is")]
+    NotFound { name: String },
+    #[error("cannot load map \"{name}\": {source}")]
+    Bsp { name: String, source: BspError },
+    #[error(transparent)]
+    Files(#[from] VfsError),
+}
+
+/// A loaded map, ready for the tracers. World units, z up; radiance in luxel units.
+pub struct Scene {
+    pub name: String,
+    pub bsp: Bsp,
+    pub entities: Vec<Entity>,
+    pub spawns: Vec<Spawn>,
+    pub textures: Vec<Texture>,
+    /// One per shader entry of the map.
+    pub material_sources: Vec<MaterialSource>,
+    pub materials: Vec<Material>,
+    pub geometry: Geometry,
+    /// Where meshes stand; placement 0 is the world.
+    pub placements: Vec<Placement>,
+    pub lights: LightTable,
+    pub clusters: ClusterMap,
+    pub rows: LightRows,
+    pub bsp_nodes: Vec<BspNode>,
+    /// What is missing or damaged, one sentence each, each once.
+    pub warnings: Vec<String>,
+    /// Time that each step of loading took.
+    pub timings: Vec<(&'static str, Duration)>,
+}
+
+struct Stopwatch {
+    last: Instant,
+    timings: Vec<(&'static str, Duration)>,
+}
+
+impl Stopwatch {
+    fn lap(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.timings.push((name, now - self.last));
+        self.last = now;
+    }
+}
+
+/// All shader scripts of a search path, in the game's order of precedence.
+pub fn load_scripts(files: &dyn FileSource) -> Result<ShaderLibrary, VfsError> {
+    let mut texts = Vec::new();
+    for path in files.list("scripts", "shader") {
+        if let Some(bytes) = files.read(&path)? {
+            texts.push((path, String::from_utf8_lossy(&bytes).into_owned()));
+        }
+    }
+    Ok(ShaderLibrary::from_files(texts))
+}
+
+impl Scene {
+    /// Loads a map by name from a file source.
+    ///
+    /// # Errors
+    /// [`SceneError`] where there is no such map or it is damaged. Missing images and scripts are warnings.
+    pub fn load(files: &dyn FileSource, name: &str) -> Result<Self, SceneError> {
+        let start = Instant::now();
+        let bytes = files
+            .read(&map_path(name))?
+            .ok_or_else(|| SceneError::NotFound { name: name.to_owned() })?;
+        let bsp = Bsp::read(&bytes).map_err(|source| SceneError::Bsp {
+            name: name.to_owned(),
+            source,
+        })?;
+        drop(bytes);
+        Self::from_bsp_timed(files, name, bsp, start)
+    }
+
+    /// Builds a scene of a map that is already in memory.
+    ///
+    /// # Errors
+    /// [`SceneError::Files`] where scripts exist and cannot be read.
+    pub fn from_bsp(files: &dyn FileSource, name: &str, bsp: Bsp) -> Result<Self, SceneError> {
+        Self::from_bsp_timed(files, name, bsp, Instant::now())
+    }
+
+    fn from_bsp_timed(files: &dyn FileSource, name: &str, bsp: Bsp, start: Instant) -> Result<Self, SceneError> {
+        let mut watch = Stopwatch {
+            last: start,
+            timings: Vec::new(),
+        };
+        watch.lap("bsp");
+        let scripts = load_scripts(files)?;
+        watch.lap("scripts");
+        let (entities, mut warnings) = entities::parse(&bsp.entities);
+        let mut requests = TextureRequests::default();
+        let mut material_sources: Vec<MaterialSource> = bsp
+            .shaders
+            .iter()
+            .map(|s| MaterialSource::new(&s.name.text(), s.surface_flags, &scripts, &mut requests))
+            .collect();
+        let (textures, missing) = requests.load(files);
+        warnings.extend(missing);
+        for source in &mut material_sources {
+            source.resolve(&textures);
+        }
+        let materials: Vec<Material> = material_sources.iter().map(|m| m.record(&textures)).collect();
+        watch.lap("textures");
+        let emits: Vec<bool> = material_sources.iter().map(|m| m.surface_light().is_some()).collect();
+        let mut geometry = static_geometry::build(&bsp, &material_sources, &emits);
+        if geometry.meshes.is_empty() {
+            warnings.push("the map has no world model: nothing is drawn".to_owned());
+        }
+        let placements = entity_geometry::placements(&entities, geometry.meshes.len());
+        watch.lap("geometry");
+        let worldspawn = entities.iter().find(|e| e.class() == "worldspawn");
+        let far_plane = worldspawn
+            .and_then(|w| w.number("_farplanedist"))
+            .filter(|&far| far > 0.0);
+        let clusters = ClusterMap::new(&bsp, far_plane);
+        let mut mesh_placements = vec![None; geometry.meshes.len()];
+        for p in &placements {
+            mesh_placements[p.mesh as usize].get_or_insert(p.object_to_world);
+        }
+        let lights = LightTable::collect(&LightInputs {
+            bsp: &bsp,
+            entities: &entities,
+            geometry: &geometry,
+            placements: &mesh_placements,
+            sources: &material_sources,
+            materials: &materials,
+            clusters: &clusters,
+        });
+        let rows = build_light_rows(&clusters, &lights.reach);
+        for t in &mut geometry.triangles {
+            t.fallback_row = rows.surface_row[t.surface as usize];
+        }
+        watch.lap("lights");
+        Ok(Self {
+            name: name.to_owned(),
+            spawns: spawns(&entities),
+            bsp_nodes: bsp_records(&bsp),
+            bsp,
+            entities,
+            textures,
+            material_sources,
+            materials,
+            geometry,
+            placements,
+            lights,
+            clusters,
+            rows,
+            warnings,
+            timings: watch.timings,
+        })
+    }
+}

@@ -1,0 +1,18 @@
+//! What is rendered: triangles, materials, lights, clusters and views.
+
+pub mod bvh;
+pub mod camera;
+pub mod clusters;
+pub mod emission;
+pub mod entity_geometry;
+pub mod lights;
+pub mod load;
+pub mod material;
+pub mod records;
+pub mod report;
+pub mod sampling;
+pub mod spawns;
+pub mod static_geometry;
+pub mod textures;
+
+pub use load::{Scene, SceneError};

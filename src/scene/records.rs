@@ -1,0 +1,161 @@
+//! Plain records that the CPU tracer and the shaders read alike. `shaders/include/scene.glsl` is their GLSL side; a test
+//! compares member offsets by reflection of the compiled shaders.
+
+use bytemuck::{Pod, Zeroable};
+
+/// "None" in an index field.
+pub const NONE: u32 = u32::MAX;
+
+/// What shading needs of a vertex beside its position.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct VertexAttributes {
+    /// Unit shading normal, object space.
+    pub normal: [f32; 3],
+    /// Texture coordinates; (0, 0) is the image's top left corner.
+    pub uv: [f32; 2],
+    /// Encoded vertex colour, RGBA8 with red in the lowest byte.
+    pub color: u32,
+}
+
+/// A triangle of the scene, addressed by its global index.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Triangle {
+    /// Global vertex indices.
+    pub vertices: [u32; 3],
+    pub material: u32,
+    /// Surface of the map file.
+    pub surface: u32,
+    /// Light-list row for receivers whose own position is in no cluster.
+    pub fallback_row: u32,
+}
+
+/// `Material::flags`: keep a hit only where the alpha test passes.
+pub const MATERIAL_ALPHA_TESTED: u32 = 1;
+/// `Material::flags`: the surface is a window to the sky.
+pub const MATERIAL_SKY: u32 = 2;
+/// `Material::flags`: emits on both sides.
+pub const MATERIAL_TWO_SIDED_EMISSION: u32 = 4;
+/// `Material::flags`: texture coordinates clamp instead of repeating.
+pub const MATERIAL_CLAMP: u32 = 8;
+/// `Material::flags`: the six textures of a sky box are present.
+pub const MATERIAL_SKY_BOX: u32 = 16;
+
+/// Surface appearance as the tracer sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Material {
+    /// Texture of the albedo.
+    pub texture: u32,
+    pub flags: u32,
+    /// Alpha test: passes where alpha·`alpha_scale` + `alpha_offset` > 0 (alpha in 0..1).
+    pub alpha_scale: f32,
+    pub alpha_offset: f32,
+    /// Emitted radiance (luxel units) where the emission texture is 1 (linear), or everywhere without one.
+    pub emission: [f32; 3],
+    /// Texture that modulates emission, or [`NONE`].
+    pub emission_texture: u32,
+    /// Sky box images, or [`NONE`]: right (+x of the box), left, back, front, up, down in id's naming.
+    pub sky: [u32; 6],
+}
+
+/// A placed mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Instance {
+    /// Object to world, three rows of four.
+    pub object_to_world: [[f32; 4]; 3],
+    /// World to object, three rows of four.
+    pub world_to_object: [[f32; 4]; 3],
+    /// First global triangle of the mesh.
+    pub first_triangle: u32,
+    pub mesh: u32,
+    /// 1 where the transform is exactly the identity.
+    pub identity: u32,
+    pub padding: u32,
+}
+
+/// `Light::kind`: a triangle of an emissive surface.
+pub const LIGHT_TRIANGLE: u32 = 0;
+/// `Light::kind`: a small sphere (light entities).
+pub const LIGHT_SPHERE: u32 = 1;
+/// `Light::kind`: a sun of a given angular radius, seen through sky surfaces.
+pub const LIGHT_SUN: u32 = 2;
+/// `Light::kind`: the compiler's sky dome (`q3map_skylight`), seen through sky surfaces.
+pub const LIGHT_DOME: u32 = 3;
+
+/// `Light::flags`: a triangle that emits on both sides.
+pub const LIGHT_TWO_SIDED: u32 = 1;
+/// `Light::flags`: a sphere with linear fall-off (see `p2`).
+pub const LIGHT_LINEAR: u32 = 2;
+/// `Light::flags`: a sphere limited to a cone (see `p1`, `p2`).
+pub const LIGHT_SPOT: u32 = 4;
+/// `Light::flags`: no cosine at the receiver (light entities with the respective spawn flag).
+pub const LIGHT_NO_COSINE: u32 = 8;
+
+/// A light. Meaning of the vectors by kind:
+///
+/// | kind | `p0` | `p1` | `p2` | `radiance` |
+/// |---|---|---|---|---|
+/// | triangle | first vertex | edge to the second | edge to the third | as `Material::emission` |
+/// | sphere | centre | unit axis of the spot | (cone radius at distance 1, fade, photons/255) | radiance of the sphere's surface |
+/// | sun | unit direction to the sun | (azimuth, elevation, angular radius) in radians | 0 | irradiance/π at normal incidence |
+/// | dome | 0 | 0 | 0 | V/255 × colour |
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Light {
+    pub kind: u32,
+    pub flags: u32,
+    /// Global triangle, or [`NONE`].
+    pub triangle: u32,
+    pub material: u32,
+    pub p0: [f32; 3],
+    /// Area in square units (triangle), radius in units (sphere), else 0.
+    pub size: f32,
+    pub p1: [f32; 3],
+    pub instance: u32,
+    pub p2: [f32; 3],
+    pub padding: u32,
+    pub radiance: [f32; 3],
+    pub padding2: u32,
+}
+
+/// Inner node of the map's BSP for receiver classification.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct BspNode {
+    pub normal: [f32; 3],
+    pub dist: f32,
+    /// ≥ 0: node; < 0: −1 − cluster − 1 of a leaf, so that −1 is solid and −2 is cluster 0.
+    pub children: [i32; 2],
+}
+
+/// A row of light runs: lights visible from one cluster.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightRow {
+    pub first_run: u32,
+    pub run_count: u32,
+    /// Lights in all runs of the row.
+    pub light_count: u32,
+}
+
+/// A run of consecutive lights in a row.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightRun {
+    pub first_light: u32,
+    pub count: u32,
+    /// Lights in the row's earlier runs.
+    pub before: u32,
+}
+
+/// Size of a texture in pixels, and its number of mip levels.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TextureInfo {
+    pub width: u32,
+    pub height: u32,
+    pub levels: u32,
+}

@@ -1,0 +1,191 @@
+//! Static world and brush models: the map's drawn surfaces as triangles.
+
+use super::material::{MaterialSource, Visibility};
+use super::records::{Triangle, VertexAttributes};
+use crate::assets::bsp::lumps::{SURFACE_FLARE, SURFACE_PATCH, Surface};
+use crate::assets::bsp::patch::{CURVATURE_BOUND, MeshVertex, tessellate};
+use crate::assets::bsp::{Bounds, Bsp};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// The five geometry classes of the thesis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GeometryClass {
+    /// World, nothing changes.
+    WorldStatic,
+    /// World whose texture coordinates, colours or images change with the clock.
+    WorldDynamicData,
+    /// World whose vertices move (`deformVertexes`).
+    WorldDynamic,
+    /// Entities that move rigidly: brush models, single-frame models.
+    EntityStatic,
+    /// Entities with vertex animation.
+    EntityDynamic,
+}
+
+/// A mesh: one bottom-level acceleration structure.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    pub class: GeometryClass,
+    /// First global triangle.
+    pub first_triangle: u32,
+    /// Triangles that stop every ray; they come first.
+    pub opaque_count: u32,
+    /// All triangles.
+    pub triangle_count: u32,
+    /// Object-space bounds of the vertices.
+    pub bounds: Bounds,
+}
+
+/// Vertices, triangles and meshes of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Geometry {
+    /// Object-space positions, units.
+    pub positions: Vec<[f32; 3]>,
+    pub attributes: Vec<VertexAttributes>,
+    pub triangles: Vec<Triangle>,
+    /// `meshes[i]` is the map's model i; model 0 is the world.
+    pub meshes: Vec<Mesh>,
+    /// Triangles from here on belong to no mesh: emitters that rays do not meet.
+    pub untraced_from: u32,
+    /// Triangles dropped because they have no area.
+    pub degenerate: u32,
+}
+
+impl Geometry {
+    /// Corner positions of a triangle, object space.
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize]
+            .vertices
+            .map(|v| Vec3::from(self.positions[v as usize]))
+    }
+}
+
+/// Triangles of one surface, wound counter-clockwise seen from the front.
+struct SurfaceMesh {
+    surface: u32,
+    vertices: Vec<MeshVertex>,
+    indices: Vec<u32>,
+    degenerate: u32,
+}
+
+fn surface_mesh(bsp: &Bsp, index: u32) -> SurfaceMesh {
+    let s: &Surface = &bsp.surfaces[index as usize];
+    let own = &bsp.vertices[s.first_vertex as usize..(s.first_vertex + s.vertex_count) as usize];
+    let (vertices, indices) = if s.kind == SURFACE_PATCH {
+        let mesh = tessellate(own, s.patch_width as usize, s.patch_height as usize, CURVATURE_BOUND);
+        (mesh.vertices, mesh.indices)
+    } else if s.kind == SURFACE_FLARE {
+        (Vec::new(), Vec::new())
+    } else {
+        let first = s.first_index as usize;
+        let indices = &bsp.indices[first..first + s.index_count as usize / 3 * 3];
+        (
+            own.iter().map(MeshVertex::from).collect(),
+            indices.iter().map(|&i| i as u32).collect(),
+        )
+    };
+    let mut out = SurfaceMesh {
+        surface: index,
+        indices: Vec::with_capacity(indices.len()),
+        degenerate: 0,
+        vertices,
+    };
+    for t in indices.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|i| out.vertices[i as usize]);
+        let cross = (b.position - a.position).cross(c.position - a.position);
+        if cross.length_squared() <= f32::MIN_POSITIVE || !cross.is_finite() {
+            out.degenerate += 1;
+        } else if cross.dot(a.normal + b.normal + c.normal) < 0.0 {
+            out.indices.extend([t[0], t[2], t[1]]);
+        } else {
+            out.indices.extend([t[0], t[1], t[2]]);
+        }
+    }
+    out
+}
+
+/// Builds all models of a map. `material_of[shader]` is the material of each shader entry.
+pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool]) -> Geometry {
+    let meshes: Vec<SurfaceMesh> = (0..bsp.surfaces.len() as u32)
+        .into_par_iter()
+        .map(|i| surface_mesh(bsp, i))
+        .collect();
+    let visibility = |s: &SurfaceMesh| materials[bsp.surfaces[s.surface as usize].shader as usize].visibility;
+    let mut out = Geometry::default();
+    let mut untraced = Vec::new();
+    for (model_index, model) in bsp.models.iter().enumerate() {
+        let first_triangle = out.triangles.len() as u32;
+        let range = model.first_surface.max(0) as usize..(model.first_surface.max(0) + model.surface_count) as usize;
+        let mut bounds = Bounds::EMPTY;
+        for tested in [false, true] {
+            for mesh in &meshes[range.clone()] {
+                let wanted = match visibility(mesh) {
+                    Visibility::Opaque | Visibility::Sky => !tested,
+                    Visibility::AlphaTested => tested,
+                    Visibility::Blended | Visibility::Invisible => {
+                        let shader = bsp.surfaces[mesh.surface as usize].shader as usize;
+                        if tested && emits[shader] {
+                            untraced.push(mesh.surface);
+                        }
+                        false
+                    }
+                };
+                if wanted {
+                    out.append(bsp, mesh);
+                    for v in &mesh.vertices {
+                        bounds.include(v.position);
+                    }
+                }
+            }
+            if !tested {
+                out.meshes.push(Mesh {
+                    class: if model_index == 0 {
+                        GeometryClass::WorldStatic
+                    } else {
+                        GeometryClass::EntityStatic
+                    },
+                    first_triangle,
+                    opaque_count: out.triangles.len() as u32 - first_triangle,
+                    triangle_count: 0,
+                    bounds,
+                });
+            }
+        }
+        let triangle_count = out.triangles.len() as u32 - first_triangle;
+        let mesh = &mut out.meshes[model_index];
+        mesh.triangle_count = triangle_count;
+        mesh.bounds = bounds;
+    }
+    out.untraced_from = out.triangles.len() as u32;
+    for surface in untraced {
+        out.append(bsp, &meshes[surface as usize]);
+    }
+    out
+}
+
+impl Geometry {
+    fn append(&mut self, bsp: &Bsp, mesh: &SurfaceMesh) {
+        let base = self.positions.len() as u32;
+        for v in &mesh.vertices {
+            self.positions.push(v.position.into());
+            let color = v.color.to_array().map(|c| (c * 255.0 + 0.5).clamp(0.0, 255.0) as u8);
+            self.attributes.push(VertexAttributes {
+                normal: v.normal.into(),
+                uv: v.uv.into(),
+                color: u32::from_le_bytes(color),
+            });
+        }
+        let material = bsp.surfaces[mesh.surface as usize].shader as u32;
+        for t in mesh.indices.chunks_exact(3) {
+            self.triangles.push(Triangle {
+                vertices: [base + t[0], base + t[1], base + t[2]],
+                material,
+                surface: mesh.surface,
+                fallback_row: 0,
+            });
+        }
+        self.degenerate += mesh.degenerate;
+    }
+}
