@@ -161,7 +161,7 @@ impl Engine {
         Ok(match self {
             Self::Cpu => Prepared::Cpu(CpuRenderer::new(scene)),
             Self::Vulkan { device, backend } => {
-                Prepared::Gpu(Box::new(SceneGpu::new(device, scene, *backend, BvhQuality::Balanced)?))
+                Prepared::Gpu(Arc::new(SceneGpu::new(device, scene, *backend, BvhQuality::Balanced)?))
             }
         })
     }
@@ -186,7 +186,7 @@ impl Engine {
 /// A scene ready to be traced.
 pub enum Prepared<'a> {
     Cpu(CpuRenderer<'a>),
-    Gpu(Box<SceneGpu>),
+    Gpu(Arc<SceneGpu>),
 }
 
 /// An accumulation as it was asked for.

@@ -3,6 +3,7 @@
 //! `assets` reads game data, `scene` makes triangles, materials, lights and clusters of it, `reference` traces it on the
 //! CPU, `gpu` and `render` on Vulkan devices. None of these knows of windows, the console or where files lie.
 
+pub mod app;
 pub mod assets;
 pub mod cli;
 pub mod console;

@@ -1,6 +1,6 @@
 //! Arguments: sub-commands by `clap`, and Quake's `+set NAME VALUE` and `+COMMAND` anywhere.
 
-use super::{common::Common, compare, info, maps, merge, render};
+use super::{common::Common, compare, info, maps, merge, play, render};
 use crate::console::Cvars;
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
@@ -45,6 +45,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Fly through a map in a window (the default)
+    Play(play::Args),
     /// Render one view without a window
     Render(render::Args),
     /// Describe a map
@@ -134,12 +136,8 @@ fn dispatch() -> CliResult {
         Some(Command::Maps(args)) => maps::run(&cli.common, &args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
-        None => {
-            let _ = map;
-            Err(CliError::Failed(
-                "the window is not built yet; try `q3rays render`".to_owned(),
-            ))
-        }
+        Some(Command::Play(args)) => play::run(&cli.common, cvars, args, map),
+        None => play::run(&cli.common, cvars, play::Args::default(), map),
     }
 }
 

@@ -6,6 +6,7 @@ mod compare;
 mod info;
 mod maps;
 mod merge;
+mod play;
 mod render;
 
-pub use args::run;
+pub use args::{CliError, run};

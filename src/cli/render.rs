@@ -2,10 +2,13 @@
 
 use super::args::{CliError, CliResult};
 use super::common::{Common, progress};
+use crate::app::headless::{Loop, run_frames, run_stats};
 use crate::console::Cvars;
 use crate::console::settings::settings;
 use crate::engine::Job;
+use crate::output::stats::FrameStats;
 use crate::output::{OutputError, atomic, exr_file, png_file};
+use crate::reference::direct::RayCounts;
 use crate::render::film::{Aovs, Film};
 use crate::render::settings::Settings;
 use crate::render::tonemap::{automatic_exposure, display};
@@ -13,6 +16,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::spawns::{overview, view};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// Arguments of `render`.
 #[derive(clap::Args)]
@@ -42,6 +46,18 @@ pub struct Args {
     /// Number of the first sample, for runs that are merged later
     #[arg(long, value_name = "K", default_value_t = 0)]
     first_sample: u32,
+    /// Run the real-time loop for N frames and write the last
+    #[arg(long, value_name = "N", conflicts_with = "spp", value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// Scene clock of the first frame, seconds (nothing in a scene moves yet)
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    time: Option<f64>,
+    /// Frames per second of the scene clock; without it the clock stands still
+    #[arg(long, value_name = "F")]
+    fps: Option<f64>,
+    /// Write times per frame: .json or .csv
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
     /// Image to write: .png or .exr
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -157,6 +173,17 @@ fn write_aovs(folder: &Path, film: &Film, aovs: &Aovs) -> Result<(), OutputError
     Ok(())
 }
 
+/// An accumulation counts as one frame.
+fn accumulation_stats(start: Instant, rays: RayCounts) -> FrameStats {
+    FrameStats {
+        index: 0,
+        cpu_ms: start.elapsed().as_secs_f64() * 1e3,
+        gpu_ms: None,
+        passes: serde_json::Map::new(),
+        rays,
+    }
+}
+
 /// Renders one view.
 pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     if let Some(fov) = &args.fov {
@@ -185,20 +212,38 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     let engine = common.engine(&cvars)?;
     let prepared = engine.prepare(&scene).map_err(CliError::failed)?;
     let bar = progress(1000, &args.map);
-    let job = Job {
-        camera: &camera,
-        size: args.size,
-        settings: &settings,
-        range,
+    let advance = |share: f32| bar.set_position((share * 1000.0) as u64);
+    let (film, frames) = if let Some(count) = args.frames {
+        let note = |text: &str| eprintln!("{text}");
+        let job = Loop {
+            size: args.size,
+            settings: &settings,
+            count,
+            path: &|_| camera,
+            accumulate: cvars.number("rt_accumulate") != 0.0,
+        };
+        let run = run_frames(&prepared, &job, &advance, &note)?;
+        (run.film, run.frames)
+    } else {
+        let job = Job {
+            camera: &camera,
+            size: args.size,
+            settings: &settings,
+            range,
+        };
+        let start = Instant::now();
+        let (film, rays) = prepared.accumulate(job, &advance).map_err(CliError::failed)?;
+        (film, vec![accumulation_stats(start, rays)])
     };
-    let (film, _) = prepared
-        .accumulate(job, &|share| bar.set_position((share * 1000.0) as u64))
-        .map_err(CliError::failed)?;
     bar.finish_and_clear();
     if film.non_finite() > 0 {
         eprintln!("warning: {} pixels are not finite", film.non_finite());
     }
     write_image(&args.out, &film, &settings).map_err(CliError::failed)?;
+    if let Some(path) = &args.stats {
+        let stats = run_stats(&engine, &cvars, &args.map, args.size, frames);
+        stats.write(path).map_err(CliError::failed)?;
+    }
     if let Some(folder) = &args.aov {
         let aovs = prepared.aovs(&camera, args.size, &settings).map_err(CliError::failed)?;
         write_aovs(folder, &film, &aovs).map_err(CliError::failed)?;

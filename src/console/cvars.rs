@@ -112,6 +112,13 @@ pub const CVARS: &[Cvar] = &[
         1,
         "refines the still image by averaging frames; implies rt_pause",
     ),
+    int(
+        "rt_refine",
+        1,
+        0,
+        1,
+        "averages frames in the window while nothing moves",
+    ),
     int("rt_pause", 0, 0, 1, "stops the scene's clock"),
     float(
         "rt_exposure",

@@ -13,6 +13,7 @@ pub mod gbuffer;
 pub mod gpu_renderer;
 pub mod pass;
 pub mod primary;
+pub mod realtime;
 pub mod scene_gpu;
 pub mod settings;
 pub mod tone_map;

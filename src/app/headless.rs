@@ -1,0 +1,193 @@
+//! A run without a window: a fly-through with statistics, for machines without a display.
+
+use crate::cli::CliError;
+use crate::console::Cvars;
+use crate::console::settings::settings;
+use crate::content::fly_through;
+use crate::engine::{Engine, Job, Prepared};
+use crate::gpu::SubmitSync;
+use crate::output::stats::{FrameStats, RunStats, Summary};
+use crate::output::{atomic, png_file};
+use crate::reference::direct::RayCounts;
+use crate::render::film::Film;
+use crate::render::frame::FrameInput;
+use crate::render::gpu_renderer::film as read_film;
+use crate::render::realtime::Realtime;
+use crate::render::settings::Settings;
+use crate::render::tonemap::{automatic_exposure, display};
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+use crate::scene::spawns::{overview, view};
+use std::path::Path;
+use std::time::Instant;
+
+/// Image size and number of frames.
+pub const SIZE: (u32, u32) = (640, 360);
+pub const FRAMES: u32 = 120;
+/// Frames of the flight; the rest refine the view at its end, which becomes the picture.
+const FLIGHT: u32 = 56;
+
+/// What a loop of frames left behind.
+pub struct Run {
+    /// The last frame; on the CPU the mean of all.
+    pub film: Film,
+    pub frames: Vec<FrameStats>,
+}
+
+/// A loop of frames.
+pub struct Loop<'a> {
+    pub size: (u32, u32),
+    pub settings: &'a Settings,
+    pub count: u32,
+    /// View of each frame.
+    pub path: &'a dyn Fn(u32) -> Camera,
+    /// Average frames as long as the view stays the same.
+    pub accumulate: bool,
+}
+
+/// Renders frames along a camera path. On the CPU there is no frame loop: the last view is accumulated over as many
+/// samples, and `note` is told so.
+///
+/// # Errors
+/// One sentence of the device's.
+pub fn run_frames(
+    prepared: &Prepared<'_>,
+    job: &Loop<'_>,
+    progress: &(dyn Fn(f32) + Sync),
+    note: &dyn Fn(&str),
+) -> Result<Run, CliError> {
+    let (count, path) = (job.count, job.path);
+    let scene = match prepared {
+        Prepared::Cpu(_) => {
+            note("the CPU tracer has no frame loop: accumulating as many samples of the last view instead");
+            let start = Instant::now();
+            let still = Job {
+                camera: &path(count.saturating_sub(1)),
+                size: job.size,
+                settings: job.settings,
+                range: 0..count,
+            };
+            let (film, rays) = prepared.accumulate(still, progress).map_err(CliError::failed)?;
+            let cpu_ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(count.max(1));
+            let share = |n: u64| n / u64::from(count.max(1));
+            let frames = (0..count)
+                .map(|index| FrameStats {
+                    index,
+                    cpu_ms,
+                    gpu_ms: None,
+                    passes: serde_json::Map::new(),
+                    rays: RayCounts {
+                        primary: share(rays.primary),
+                        shadow: share(rays.shadow),
+                        shadow_skipped: share(rays.shadow_skipped),
+                    },
+                })
+                .collect();
+            return Ok(Run { film, frames });
+        }
+        Prepared::Gpu(scene) => scene.clone(),
+    };
+    let mut realtime = Realtime::new(scene, job.size, None).map_err(CliError::failed)?;
+    let mut frames = Vec::new();
+    let mut accumulated = 0;
+    for index in 0..count {
+        let camera = path(index);
+        let still = index > 0 && camera == path(index - 1);
+        // Without accumulation each frame is an accumulation of one, so that the last can be read back alike.
+        accumulated = if job.accumulate && still { accumulated + 1 } else { 1 };
+        let input = FrameInput {
+            camera,
+            settings: *job.settings,
+            sample_index: index,
+            accumulated,
+            exposure_blend: 1.0,
+            output: true,
+        };
+        let ended = realtime
+            .frame(&input, |shown| shown.frame.submit(SubmitSync::default()))
+            .map_err(CliError::failed)?;
+        frames.extend(ended);
+        progress((index + 1) as f32 / count as f32);
+    }
+    frames.extend(realtime.finish().map_err(CliError::failed)?);
+    let film = read_film(&realtime.view, accumulated).map_err(CliError::failed)?;
+    Ok(Run { film, frames })
+}
+
+/// Statistics of a run with what is needed to repeat it.
+pub fn run_stats(engine: &Engine, cvars: &Cvars, map: &str, size: (u32, u32), frames: Vec<FrameStats>) -> RunStats {
+    let mut stats = RunStats {
+        device: String::new(),
+        backend: String::new(),
+        driver: String::new(),
+        map: map.to_owned(),
+        size: [size.0, size.1],
+        settings: cvars.all(),
+        summary: Summary::of_frames(&frames),
+        frames,
+    };
+    engine.label(&mut stats);
+    stats
+}
+
+/// The main job where there is no display: 120 frames through the map, written to `folder`.
+///
+/// # Errors
+/// One sentence of the device's or the file system's.
+pub fn run(
+    engine: &Engine,
+    scene: &Scene,
+    cvars: &Cvars,
+    folder: &Path,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<(), CliError> {
+    let settings = settings(cvars);
+    let fov = cvars.number("cg_fov") as f32;
+    let prepared = engine.prepare(scene).map_err(CliError::failed)?;
+    let path = |index: u32| {
+        if scene.name == fly_through::MAP {
+            return fly_through::camera(index as f32 / FLIGHT as f32, fov);
+        }
+        // Other maps: a turn on the spot at the first spawn point.
+        let mut camera = scene
+            .spawns
+            .first()
+            .map_or_else(|| overview(&scene.bsp, fov), |s| view(s, fov));
+        camera.yaw += 360.0 * index.min(FLIGHT) as f32 / FLIGHT as f32;
+        camera
+    };
+    let job = Loop {
+        size: SIZE,
+        settings: &settings,
+        count: FRAMES,
+        path: &path,
+        accumulate: true,
+    };
+    let run = run_frames(&prepared, &job, progress, &|text| println!("{text}"))?;
+    let stats = run_stats(engine, cvars, &scene.name, SIZE, run.frames);
+    let exposure = if settings.exposure > 0.0 {
+        settings.exposure
+    } else {
+        automatic_exposure(&run.film.mean, SIZE.0, SIZE.1)
+    };
+    let pixels: Vec<_> = run
+        .film
+        .mean
+        .iter()
+        .map(|p| display(*p, exposure, settings.tonemap))
+        .collect();
+    let picture = folder.join("frame.png");
+    atomic::create_parent(&picture).map_err(CliError::failed)?;
+    png_file::write(&picture, SIZE.0, SIZE.1, &pixels).map_err(CliError::failed)?;
+    let (json, csv) = (folder.join("stats.json"), folder.join("stats.csv"));
+    stats.write(&json).map_err(CliError::failed)?;
+    stats.write(&csv).map_err(CliError::failed)?;
+    println!(
+        "{} frames of {}x{}: median {:.2} ms, 95% {:.2} ms",
+        FRAMES, SIZE.0, SIZE.1, stats.summary.p50, stats.summary.p95
+    );
+    for path in [picture, json, csv] {
+        println!("{}", path.display());
+    }
+    Ok(())
+}
