@@ -5,7 +5,7 @@
 const float KEY = 0.18;
 const float LUMINANCE_FLOOR = 1e-4;
 const uint EXPOSURE_CELLS = 32;
-const vec2 EXPOSURE_RANGE = vec2(0.05, 64.0);
+const vec2 EXPOSURE_RANGE = vec2(0.05, 16.0);
 
 float luminance(vec3 c) {
     return dot(c, vec3(0.2126, 0.7152, 0.0722));

@@ -8,7 +8,7 @@ pub const KEY: f32 = 0.18;
 /// Radiance below this counts as this much in the log-average, so that black pixels do not blow the exposure up.
 pub const LUMINANCE_FLOOR: f32 = 1e-4;
 /// Range of the automatic exposure.
-pub const EXPOSURE_RANGE: (f32, f32) = (0.05, 64.0);
+pub const EXPOSURE_RANGE: (f32, f32) = (0.05, 16.0);
 
 /// Rec. 709 luminance.
 pub fn luminance([r, g, b]: [f32; 3]) -> f32 {

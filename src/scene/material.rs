@@ -21,6 +21,14 @@ const SKY_SIDES: [&str; 6] = ["rt", "lf", "bk", "ft", "up", "dn"];
 /// 64, its display's unit.
 const UNLIT_SKY: f32 = 64.0 / 255.0;
 
+/// Decoded means below this in any channel belong to night skies.
+const DARK_SKY: f32 = 0.02;
+
+/// Rec. 709 luminance.
+fn luminance(c: Vec3) -> f32 {
+    c.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
 /// How rays meet a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visibility {
@@ -44,6 +52,8 @@ pub struct MaterialSource {
     /// The script has a definition for the name.
     pub scripted: bool,
     texture: u32,
+    /// Image that shows where an emitter glows.
+    glow: u32,
     clamp: bool,
     alpha_func: Option<AlphaFunc>,
     sky_box: Option<[u32; 6]>,
@@ -97,6 +107,21 @@ fn base_stage(shader: &Shader) -> Option<&Stage> {
         .or_else(|| stages().next())
 }
 
+/// The image of the first stage that adds unlit light over the surface: where a lamp glows.
+fn glow_image(shader: &Shader) -> Option<&Image> {
+    let adds = |stage: &&Stage| {
+        stage.effective_blend().is_some_and(|b| {
+            matches!(b.source, BlendFactor::One | BlendFactor::SrcAlpha) && b.destination == BlendFactor::One
+        })
+    };
+    shader
+        .drawn_stages()
+        .filter(adds)
+        .filter(|s| s.tc_gen_or_default() == TcGen::Texture)
+        .filter_map(stage_image)
+        .find(|image| image.file().is_some())
+}
+
 impl MaterialSource {
     /// The material of a map's shader entry.
     pub fn new(name: &str, flags: i32, scripts: &ShaderLibrary, requests: &mut TextureRequests) -> Self {
@@ -113,6 +138,7 @@ impl MaterialSource {
                 },
                 scripted: false,
                 texture: if hidden || sky { WHITE } else { requests.request(name) },
+                glow: WHITE,
                 clamp: false,
                 alpha_func: None,
                 sky_box: None,
@@ -140,6 +166,7 @@ impl MaterialSource {
             visibility,
             scripted: true,
             texture,
+            glow: glow_image(shader).map_or(texture, |image| image_texture(image, requests)),
             clamp: matches!(base.and_then(|s| s.texture.as_ref()), Some(StageTexture::ClampMap(_))),
             alpha_func: base.and_then(|s| s.alpha_func),
             sky_box: shader
@@ -188,7 +215,7 @@ impl MaterialSource {
         Some(Emission::from_surface_light(
             source.value,
             self.colour,
-            textured.then_some(self.texture),
+            textured.then_some(self.glow),
         ))
     }
 
@@ -247,11 +274,9 @@ impl MaterialSource {
                 .sum::<Vec3>()
                 / 6.0;
             let scale = match radiance {
-                Some(l) => Vec3::select(
-                    mean.cmpgt(Vec3::splat(1e-3)),
-                    l / mean.max(Vec3::splat(1e-3)),
-                    Vec3::ZERO,
-                ),
+                Some(l) if mean.min_element() >= DARK_SKY => l / mean,
+                // A night sky has no hue to speak of: only its brightness is matched.
+                Some(l) => Vec3::splat(luminance(l) / luminance(mean).max(1e-4)),
                 None => Vec3::splat(UNLIT_SKY),
             };
             record.emission = scale.into();

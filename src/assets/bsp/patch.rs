@@ -10,7 +10,7 @@ use super::lumps::Vertex;
 use glam::{Vec2, Vec3, Vec4};
 
 /// Largest distance in units between curve and chord.
-pub const CURVATURE_BOUND: f32 = 0.5;
+pub const CURVATURE_BOUND: f32 = 0.1;
 /// Most segments along one edge of a 3x3 sub-patch, a power of two.
 const MAX_SEGMENTS: usize = 64;
 
