@@ -153,6 +153,7 @@ impl MaterialSource {
             };
         };
         let base = base_stage(shader);
+        let glow = glow_image(shader);
         let colour_rgb = shader.compiler.light_rgb.filter(|c| *c != Vec3::ZERO);
         let sky_light = shader.compiler.sky_light.map(|s| s.intensity).filter(|&i| i > 0.0);
         let visibility = visibility(shader, flags);
@@ -166,7 +167,7 @@ impl MaterialSource {
             visibility,
             scripted: true,
             texture,
-            glow: glow_image(shader).map_or(texture, |image| image_texture(image, requests)),
+            glow: glow.map_or(texture, |image| image_texture(image, requests)),
             clamp: matches!(base.and_then(|s| s.texture.as_ref()), Some(StageTexture::ClampMap(_))),
             alpha_func: base.and_then(|s| s.alpha_func),
             sky_box: shader
@@ -178,7 +179,8 @@ impl MaterialSource {
             autosprite: shader.is_autosprite(),
             emission: shader.emits().map(|value| EmissionSource {
                 value,
-                constant: colour_rgb.is_some() || shader.compiler.light_image.is_some(),
+                // Where nothing tells which part of the surface glows, a colour given apart means all of it.
+                constant: glow.is_none() && (colour_rgb.is_some() || shader.compiler.light_image.is_some()),
             }),
             suns: shader.compiler.suns.clone(),
             colour_images: if (shader.emits().is_some() || sky_light.is_some()) && colour_rgb.is_none() {
