@@ -233,21 +233,34 @@ fn packed_triangle(scene: &Scene, triangle: u32) -> [f32; 12] {
     ]
 }
 
-/// The binary tree over all instances but the world, and its root reference; children below zero are −1 − instance.
+/// A binary tree over placed meshes. References below zero are −1 − instance.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InstanceTree {
+    /// (min, reference) (max, 0) of both children; empty where the root is an instance itself.
+    pub nodes: Vec<[f32; 16]>,
+    /// Reference of the root.
+    pub root: u32,
+}
+
+/// The tree over all instances that are drawn but the world; `None` where there are none.
+///
+/// # Errors
+/// [`TreeError::Depth`] where the tree is deeper than the shaders' stack.
 pub fn instance_tree(
     geometry: &Geometry,
     instances: &[Instance],
     map: &str,
-) -> Result<(Vec<[f32; 16]>, u32), TreeError> {
-    let boxes: Vec<Aabb> = instances
+) -> Result<Option<InstanceTree>, TreeError> {
+    // Models without triangles (triggers, often by the hundred) would make a long chain of equal boxes.
+    let drawn: Vec<usize> = (1..instances.len())
+        .filter(|&i| geometry.meshes[instances[i].mesh as usize].triangle_count > 0)
+        .collect();
+    let boxes: Vec<Aabb> = drawn
         .iter()
-        .skip(1)
-        .map(|i| {
+        .map(|&i| {
+            let i = &instances[i];
             let mesh = &geometry.meshes[i.mesh as usize];
             let mut b = Aabb::empty();
-            if mesh.triangle_count == 0 {
-                return Aabb::new(Vec3::splat(1e30).into(), Vec3::splat(1e30).into());
-            }
             for corner in 0..8 {
                 let pick = |axis: usize| {
                     if corner >> axis & 1 == 1 {
@@ -266,12 +279,13 @@ pub fn instance_tree(
         })
         .collect();
     if boxes.is_empty() {
-        return Ok((Vec::new(), 0));
+        return Ok(None);
     }
     let mut params = obvhs::BvhBuildParams::fast_build();
     params.max_prims_per_leaf = 1;
     let tree = build_bvh2(&boxes, params, &mut Duration::default());
-    let reference = |first: u32, _count: u32| (-1 - (tree.primitive_indices[first as usize] as i32 + 1)) as u32;
+    let reference =
+        |first: u32, _count: u32| (-1 - drawn[tree.primitive_indices[first as usize] as usize] as i32) as u32;
     let (nodes, root, depth) = pack_pairs(&tree, reference);
     if depth > INSTANCE_STACK {
         return Err(TreeError::Depth {
@@ -282,5 +296,5 @@ pub fn instance_tree(
             most: INSTANCE_STACK,
         });
     }
-    Ok((nodes, root))
+    Ok(Some(InstanceTree { nodes, root }))
 }

@@ -184,9 +184,19 @@ pub fn film(view: &ViewState, count: u32) -> Result<Film, RenderError> {
     let n = f64::from(count.max(1));
     for i in 0..film.mean.len() {
         film.samples[i] = count as f32;
-        film.mean[i] = std::array::from_fn(|c| ((f64::from(sums[i][c]) - f64::from(lost[i][c])) / n) as f32);
-        film.direct[i] = std::array::from_fn(|c| (f64::from(direct[i][c]) / n) as f32);
-        film.emission[i] = std::array::from_fn(|c| (f64::from(emission[i][c]) / n) as f32);
+        for c in 0..3 {
+            let mean = (f64::from(sums[i][c]) - f64::from(lost[i][c])) / n;
+            // The shares are summed without compensation and drift with the number of samples: they are used as shares.
+            let (direct, emission) = (f64::from(direct[i][c]), f64::from(emission[i][c]));
+            let scale = if direct + emission > 0.0 {
+                mean / (direct + emission)
+            } else {
+                0.0
+            };
+            film.mean[i][c] = mean as f32;
+            film.direct[i][c] = (direct * scale) as f32;
+            film.emission[i][c] = (emission * scale) as f32;
+        }
         if count > 1 {
             film.variance[i] = (f64::from(sums[i][3]) / (n * (n - 1.0))) as f32;
         }

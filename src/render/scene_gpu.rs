@@ -111,7 +111,14 @@ impl SceneGpu {
     ) -> Result<Self, RenderError> {
         let instances: Vec<Instance> = scene.placements.iter().map(|p| p.record(&scene.geometry)).collect();
         let trees = MeshTrees::build(scene, quality)?;
-        let (instance_nodes, instance_root) = instance_tree(&scene.geometry, &instances, &scene.name)?;
+        let others = instance_tree(&scene.geometry, &instances, &scene.name)?;
+        // Where no model but the world is drawn, there is no tree over the others to walk.
+        let instance_count = if others.is_some() {
+            instances.len()
+        } else {
+            instances.len().min(1)
+        } as u32;
+        let others = others.unwrap_or_default();
         let most = device.limits().max_sampled_images_per_stage.min(MAX_TEXTURES);
         if scene.textures.len() > most as usize {
             return Err(RenderError::Textures {
@@ -166,7 +173,7 @@ impl SceneGpu {
         let cwbvh_triangles = buffer!("8-wide triangles", &trees.cwbvh_triangles, none);
         let bvh2_nodes = buffer!("binary nodes", &trees.bvh2_nodes, none);
         let bvh2_triangles = buffer!("binary triangles", &trees.bvh2_triangles, none);
-        let instance_tree_nodes = buffer!("instance nodes", &instance_nodes, none);
+        let instance_tree_nodes = buffer!("instance nodes", &others.nodes, none);
         let indices: Vec<[u32; 3]> = g.triangles.iter().map(|t| t.vertices).collect();
         let index_buffer = buffer!("indices", &indices, build_input);
 
@@ -231,7 +238,7 @@ impl SceneGpu {
             triangles: take(triangles)?,
             materials: take(materials)?,
             instances: take(instance_records)?,
-            instance_count: instances.len() as u32,
+            instance_count,
             lights: take(lights)?,
             bsp_nodes: take(bsp_nodes)?,
             texture_infos: take(texture_infos)?,
@@ -252,7 +259,7 @@ impl SceneGpu {
                 bvh2_nodes: take(bvh2_nodes)?,
                 bvh2_triangles: take(bvh2_triangles)?,
                 instance_nodes: take(instance_tree_nodes)?,
-                instance_root,
+                instance_root: others.root,
             },
             driver,
             _textures: textures,

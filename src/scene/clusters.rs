@@ -119,6 +119,17 @@ impl ClusterMap {
         &self.visible[cluster as usize]
     }
 
+    /// Clusters of all leafs that a triangle touches.
+    pub fn at_triangle(&self, bsp: &Bsp, corners: [Vec3; 3]) -> ClusterSet {
+        let mut set = ClusterSet::new(self.count);
+        bsp.leafs_at_triangle(corners, |leaf| {
+            if let Ok(cluster) = u32::try_from(bsp.leafs[leaf].cluster) {
+                set.insert(cluster);
+            }
+        });
+        set
+    }
+
     /// Clusters of all leafs that a box touches.
     pub fn in_box(&self, bsp: &Bsp, bounds: Bounds) -> ClusterSet {
         let mut set = ClusterSet::new(self.count);

@@ -126,14 +126,18 @@ impl LightTable {
             let sky = source.visibility == Visibility::Sky;
             let two_sided = material.flags & MATERIAL_TWO_SIDED_EMISSION != 0 && !sky;
             let normal = cross / (2.0 * area);
-            let listed = &inputs.clusters.of_surface[triangle.surface as usize];
-            let clusters = if moves || listed.is_empty() {
+            let clusters = if moves {
                 let mut bounds = Bounds::EMPTY;
                 [a, b, c].into_iter().for_each(|p| bounds.include(p));
-                Some(inputs.clusters.in_box(inputs.bsp, bounds.grown(1.0))).filter(|set| !set.is_empty())
+                inputs.clusters.in_box(inputs.bsp, bounds.grown(1.0))
             } else {
-                Some(listed.clone())
+                // Leafs do not list every surface that lies in them (slimefac's teleporters are listed far from where
+                // they stand), and list some for their neighbours' sake: both count.
+                let mut set = inputs.clusters.at_triangle(inputs.bsp, [a, b, c]);
+                set.unite(&inputs.clusters.of_surface[triangle.surface as usize]);
+                set
             };
+            let clusters = Some(clusters).filter(|set| !set.is_empty());
             self.push(
                 if sky {
                     LightSource::SkyTriangle

@@ -1,7 +1,11 @@
 //! Point location and leaf enumeration in the BSP tree.
 
 use super::file::Bsp;
+use super::lumps::Leaf;
 use glam::Vec3;
+
+/// Distance within which a point counts as lying on a plane, units: more than rounding, less than any detail.
+const ON_PLANE: f32 = 1.0 / 64.0;
 
 /// Axis-aligned box in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +106,42 @@ impl Bsp {
                 stack.push(node.children[0]);
             }
             if side <= reach {
+                stack.push(node.children[1]);
+            }
+        }
+    }
+
+    /// Calls `visit` with every leaf that the triangle touches; a few beside it may be among them.
+    pub fn leafs_at_triangle(&self, corners: [Vec3; 3], mut visit: impl FnMut(usize)) {
+        if self.nodes.is_empty() {
+            if !self.leafs.is_empty() {
+                visit(0);
+            }
+            return;
+        }
+        let mut bounds = Bounds::EMPTY;
+        corners.into_iter().for_each(|p| bounds.include(p));
+        let meets = |leaf: &Leaf| {
+            // Leaf bounds are whole numbers in the file.
+            let (min, max) = (leaf.mins.map(|x| x as f32 - 1.0), leaf.maxs.map(|x| x as f32 + 1.0));
+            bounds.max.cmpge(min.into()).all() && bounds.min.cmple(max.into()).all()
+        };
+        let mut stack = vec![0i32];
+        while let Some(at) = stack.pop() {
+            if at < 0 {
+                let leaf = (-1 - at) as usize;
+                if meets(&self.leafs[leaf]) {
+                    visit(leaf);
+                }
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            let plane = &self.planes[node.plane as usize];
+            let sides = corners.map(|p| Vec3::from(plane.normal).dot(p) - plane.dist);
+            if sides.iter().any(|&s| s >= -ON_PLANE) {
+                stack.push(node.children[0]);
+            }
+            if sides.iter().any(|&s| s <= ON_PLANE) {
                 stack.push(node.children[1]);
             }
         }

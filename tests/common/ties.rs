@@ -1,0 +1,172 @@
+//! Why a pixel differs between backends: each of its samples is looked at alone, and the CPU's answer is asked for again
+//! with rays and receivers moved by as much as single precision may move them.
+
+use glam::Vec3;
+use q3rays::reference::CpuRenderer;
+use q3rays::reference::direct::{RayCounts, SampleAddress, direct_light, light_row};
+use q3rays::reference::light_sample::{Target, sample_light};
+use q3rays::reference::surface::{SurfaceHit, classify, emission_seen, offset_point, surface_at};
+use q3rays::render::settings::Settings;
+use q3rays::scene::camera::Camera;
+use q3rays::scene::records::NONE;
+use q3rays::scene::sampling::{DIM_LIGHT_PICK, DIM_LIGHT_POINT, key, sample2};
+use std::collections::BTreeMap;
+
+/// What a sample that differs was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// The rays met different triangles at the same distance: coincident surfaces, such as decals.
+    Coplanar,
+    /// The rays met different triangles, and a ray beside the CPU's meets the other one: an edge.
+    Silhouette,
+    /// The same surface, and a receiver beside the CPU's belongs to another row of lights.
+    ClusterBoundary,
+    /// The same surface, and a receiver beside the CPU's is shadowed otherwise: the edge of a shadow, or contact.
+    ShadowEdge,
+    /// The same surface, and a shadow ray that ends beside the light's sample is blocked otherwise: the light touches
+    /// what blocks it.
+    LightContact,
+    /// None of these: a bug.
+    Unexplained,
+}
+
+/// One sample of a pixel as a device saw it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    pub triangle: u32,
+    pub radiance: Vec3,
+}
+
+/// What is compared: the scene's CPU tracer and a view.
+pub struct Context<'a> {
+    pub cpu: &'a CpuRenderer<'a>,
+    pub camera: Camera,
+    pub size: (u32, u32),
+    pub settings: Settings,
+    /// Mean of the image, the scale of what counts as equal.
+    pub mean: f32,
+}
+
+/// How far single precision may move a receiver, in units of its largest coordinate.
+const RECEIVER: f32 = 4e-6;
+/// How far it may turn a ray, radians.
+const RAY: f32 = 2e-6;
+
+fn around() -> impl Iterator<Item = Vec3> {
+    (0..27).map(|i| Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32) - 1.0)
+}
+
+impl Context<'_> {
+    /// Whether two values are the same by the rule for images.
+    pub fn same(&self, a: Vec3, b: Vec3) -> bool {
+        (0..3).all(|c| (a[c] - b[c]).abs() <= 1e-3 * b[c].abs() + 1e-4 * self.mean)
+    }
+
+    fn radiance(&self, at: &SurfaceHit, direction: Vec3, address: SampleAddress) -> Vec3 {
+        let cpu = self.cpu;
+        let light = direct_light(
+            cpu.scene,
+            &cpu.tracer,
+            &self.settings,
+            at,
+            address,
+            &mut RayCounts::default(),
+        );
+        at.albedo * light + emission_seen(cpu.scene, at, direction)
+    }
+
+    /// Class of one sample of a pixel; `None` where both are the same.
+    pub fn class(&self, pixel: usize, index: u32, seen: Seen) -> Option<Class> {
+        let (cpu, scene) = (self.cpu, self.cpu.scene);
+        let (x, y) = (pixel as u32 % self.size.0, pixel as u32 / self.size.0);
+        let address = SampleAddress {
+            pixel: x + (y << 16),
+            index,
+        };
+        let view = cpu.view(&self.camera, self.size, &self.settings);
+        let ray = view.sample(&self.settings, x, y, address);
+        let cast = |direction| cpu.tracer.closest(scene, ray.origin, direction, f64::from(f32::MAX));
+        let hit = cast(ray.direction);
+        let triangle = hit.map_or(NONE, |h| h.triangle);
+        let surface = hit.map(|h| surface_at(scene, &cpu.tracer, &h, ray.direction, view.pixel_width));
+        let own = surface.map_or(Vec3::ZERO, |s| self.radiance(&s, ray.direction, address));
+        if self.same(seen.radiance, own) {
+            return None;
+        }
+        let Some(surface) = surface.filter(|_| triangle == seen.triangle) else {
+            return Some(self.tie(seen.triangle, ray.origin, ray.direction, hit.map(|h| h.t)));
+        };
+        let fallback = scene.geometry.triangles[triangle as usize].fallback_row;
+        let step = RECEIVER * surface.position.abs().max_element().max(256.0);
+        for offset in around() {
+            let position = surface.position + offset * step;
+            let (cluster, row) = classify(scene, position, surface.geometric_normal, fallback);
+            let moved = SurfaceHit {
+                position,
+                cluster,
+                row,
+                ..surface
+            };
+            if self.same(seen.radiance, self.radiance(&moved, ray.direction, address)) {
+                return Some(if row == surface.row {
+                    Class::ShadowEdge
+                } else {
+                    Class::ClusterBoundary
+                });
+            }
+        }
+        Some(if self.contact(&surface, address) {
+            Class::LightContact
+        } else {
+            Class::Unexplained
+        })
+    }
+
+    /// Whether moving the end of one of the random lights' shadow rays changes what it meets.
+    fn contact(&self, at: &SurfaceHit, address: SampleAddress) -> bool {
+        let (scene, settings) = (self.cpu.scene, &self.settings);
+        let (lists, row) = light_row(scene, settings, at.row);
+        let lights: Vec<u32> = lists.lights(row).collect();
+        let numbers = |dimension| {
+            let k = key(settings.seed, address.pixel, dimension);
+            sample2(settings.sequence, k, address.index)
+        };
+        let origin = offset_point(at.position, at.geometric_normal);
+        (0..settings.random_lights).any(|i| {
+            let [u, _] = numbers(DIM_LIGHT_PICK + i);
+            let pick = ((u * lights.len() as f32) as usize).min(lights.len() - 1);
+            let light = &scene.lights.lights[lights[pick] as usize];
+            let sample = sample_light(scene, light, at, numbers(DIM_LIGHT_POINT + i), settings.soft_shadows);
+            let Some(Target::Point(end)) = sample.map(|s| s.target) else {
+                return false;
+            };
+            let blocked = |end: Vec3| self.cpu.tracer.occluded(scene, origin, end - origin, 1.0);
+            let step = RECEIVER * end.abs().max_element().max(256.0);
+            around().any(|offset| blocked(end + offset * step) != blocked(end))
+        })
+    }
+
+    /// Class of rays that met different triangles.
+    fn tie(&self, other: u32, origin: Vec3, direction: Vec3, t: Option<f64>) -> Class {
+        let scene = self.cpu.scene;
+        if let Some(t) = t.filter(|_| other != NONE) {
+            let [a, b, c] = scene.geometry.corners(other).map(Vec3::as_dvec3);
+            let normal = (b - a).cross(c - a).normalize();
+            let at = origin.as_dvec3() + direction.as_dvec3() * t;
+            if normal.dot(at - a).abs() < 1e-5 * at.abs().max_element().max(256.0) {
+                return Class::Coplanar;
+            }
+        }
+        let beside = around().any(|offset| {
+            let hit = self
+                .cpu
+                .tracer
+                .closest(scene, origin, direction + offset * RAY, f64::from(f32::MAX));
+            hit.map_or(NONE, |h| h.triangle) == other
+        });
+        if beside { Class::Silhouette } else { Class::Unexplained }
+    }
+}
+
+/// Samples by class.
+pub type Tally = BTreeMap<Class, usize>;
