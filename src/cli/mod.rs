@@ -1,6 +1,7 @@
 //! The command line.
 
 mod args;
+mod bench;
 mod common;
 mod compare;
 mod info;

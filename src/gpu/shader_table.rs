@@ -44,6 +44,17 @@ shader_table! {
     "composite": "composite.comp" [];
     "exposure": "exposure.comp" [];
     "tone_map": "tone_map.comp" [];
+    "bench_generate_primary": "bench_generate.comp" ["RAYS_PRIMARY" = "1"];
+    "bench_generate_shadow": "bench_generate.comp" ["RAYS_SHADOW" = "1"];
+    "bench_generate_diffuse": "bench_generate.comp" ["RAYS_DIFFUSE" = "1"];
+    "bench_rays_cwbvh_single": "bench_rays.comp" ["TRACE_SINGLE_LEVEL" = "1", "TRACE_OPAQUE" = "1"];
+    "bench_rays_cwbvh_two": "bench_rays.comp" ["TRACE_OPAQUE" = "1"];
+    "bench_rays_cwbvh_alpha": "bench_rays.comp" [];
+    "bench_rays_bvh2_single": "bench_rays.comp" ["TRACE_BVH2" = "1", "TRACE_SINGLE_LEVEL" = "1", "TRACE_OPAQUE" = "1"];
+    "bench_rays_bvh2_two": "bench_rays.comp" ["TRACE_BVH2" = "1", "TRACE_OPAQUE" = "1"];
+    "bench_rays_bvh2_alpha": "bench_rays.comp" ["TRACE_BVH2" = "1"];
+    "bench_rays_rayquery_two": "bench_rays.comp" ["TRACE_RAYQUERY" = "1", "TRACE_OPAQUE" = "1"];
+    "bench_rays_rayquery_alpha": "bench_rays.comp" ["TRACE_RAYQUERY" = "1"];
     "test_fill": "test/fill.comp" [];
     "test_fill_squares": "test/fill.comp" ["SQUARES" = "1"];
     "test_image": "test/image.comp" [];
