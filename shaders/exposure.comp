@@ -20,7 +20,7 @@ void main() {
         uvec2 cell = uvec2(i % cells.x, i / cells.x);
         uvec2 first = cell * FC.size / cells;
         uvec2 extent = max((cell + 1u) * FC.size / cells - first, uvec2(1));
-        uvec2 points = min(extent, uvec2(8));
+        uvec2 points = min(extent, uvec2(4));
         float mean = 0.0;
         [[dont_unroll]] for (uint k = 0; k < points.x * points.y; k++) {
             ivec2 p = ivec2(first + uvec2(k % points.x, k / points.x) * extent / points);
