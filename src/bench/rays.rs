@@ -145,7 +145,10 @@ impl<'a> RaysBench<'a> {
         let constants = device_buffer(
             &gpu.device,
             "bench constants",
-            &[constants(gpu, camera, options.size, seed)],
+            &[FrameConstants {
+                seed,
+                ..gpu.constants(camera, options.size)
+            }],
         )?;
         Ok(Self {
             scene: gpu,
@@ -331,38 +334,6 @@ fn agreement(
         workload,
         disagreement: share(different),
         hits: share(hits.iter().filter(|hit| hit[1] != NONE).count()),
-    }
-}
-
-/// What the shaders need of the frame: the scene, the view and the seed.
-fn constants(scene: &SceneGpu, camera: &Camera, size: (u32, u32), seed: u32) -> FrameConstants {
-    let axes = camera.axes();
-    let (half_width, half_height) = camera.half_extent(size.0, size.1);
-    FrameConstants {
-        positions: scene.positions.address(),
-        attributes: scene.attributes.address(),
-        triangles: scene.triangles.address(),
-        materials: scene.materials.address(),
-        instances: scene.instances.address(),
-        textures: scene.texture_infos.address(),
-        mesh_trees: scene.bvh.mesh_trees.address(),
-        cwbvh_nodes: scene.bvh.cwbvh_nodes.address(),
-        cwbvh_triangles: scene.bvh.cwbvh_triangles.address(),
-        bvh2_nodes: scene.bvh.bvh2_nodes.address(),
-        bvh2_triangles: scene.bvh.bvh2_triangles.address(),
-        instance_nodes: scene.bvh.instance_nodes.address(),
-        srgb: scene.srgb_table.address(),
-        eye: camera.eye,
-        half_width,
-        forward: axes.forward.into(),
-        half_height,
-        right: axes.right.into(),
-        up: axes.up.into(),
-        size: [size.0, size.1],
-        seed,
-        instance_count: scene.instance_count,
-        instance_root: scene.bvh.instance_root,
-        ..FrameConstants::default()
     }
 }
 

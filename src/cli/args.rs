@@ -146,6 +146,15 @@ fn dispatch() -> CliResult {
 
 /// Runs the program and returns its exit code: 0 done, 1 failed, 2 bad usage.
 pub fn run() -> ExitCode {
+    // What the library has to say beside its errors: warnings, or what RUST_LOG asks for.
+    let filter = tracing_subscriber::EnvFilter::builder()
+        .with_default_directive(tracing::Level::WARN.into())
+        .from_env_lossy();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .init();
     match dispatch() {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {

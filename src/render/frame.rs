@@ -79,7 +79,7 @@ impl FrameRenderer {
         slot: usize,
         input: &FrameInput,
     ) -> Result<(), GpuError> {
-        let constants = frame_constants(scene, view, slot, input);
+        let constants = frame_constants(scene, view, slot, input)?;
         view.constants[slot].write(0, &[constants])?;
         let mut r = Recorder {
             cmd,
@@ -94,9 +94,9 @@ impl FrameRenderer {
             },
         };
         if input.settings.aperture > 0.0 && input.settings.focus_distance <= 0.0 {
-            self.focus.record(&mut r, &view.focus)?;
+            self.focus.record(&mut r, &view.focus[slot])?;
         }
-        self.primary.record(&mut r, &view.focus)?;
+        self.primary.record(&mut r, &view.focus[slot])?;
         self.direct.record(&mut r, &view.counters[slot])?;
         self.composite.record(&mut r)?;
         if input.output {
@@ -108,54 +108,33 @@ impl FrameRenderer {
 }
 
 /// Constants of a frame. A fixed focus distance is written to its buffer here: nothing on the GPU changes it.
-fn frame_constants(scene: &SceneGpu, view: &mut ViewState, slot: usize, input: &FrameInput) -> FrameConstants {
+fn frame_constants(
+    scene: &SceneGpu,
+    view: &mut ViewState,
+    slot: usize,
+    input: &FrameInput,
+) -> Result<FrameConstants, GpuError> {
     let s = &input.settings;
-    if s.focus_distance > 0.0 && view.focus.write(0, &[s.focus_distance]).is_err() {
-        tracing::warn!("the focus distance could not be set");
+    if s.focus_distance > 0.0 {
+        view.focus[slot].write(0, &[s.focus_distance])?;
     }
     let size = view.gbuffer.size;
-    let axes = input.camera.axes();
-    let (half_width, half_height) = input.camera.half_extent(size.0, size.1);
     let lists = if s.cull_lights == 2 { &scene.tight } else { &scene.pvs };
-    FrameConstants {
-        positions: scene.positions.address(),
-        attributes: scene.attributes.address(),
-        triangles: scene.triangles.address(),
-        materials: scene.materials.address(),
-        instances: scene.instances.address(),
-        lights: scene.lights.address(),
-        bsp_nodes: scene.bsp_nodes.address(),
+    let base = scene.constants(&input.camera, size);
+    Ok(FrameConstants {
         light_rows: lists.rows.address(),
         light_runs: lists.runs.address(),
-        textures: scene.texture_infos.address(),
-        mesh_trees: scene.bvh.mesh_trees.address(),
-        cwbvh_nodes: scene.bvh.cwbvh_nodes.address(),
-        cwbvh_triangles: scene.bvh.cwbvh_triangles.address(),
-        bvh2_nodes: scene.bvh.bvh2_nodes.address(),
-        bvh2_triangles: scene.bvh.bvh2_triangles.address(),
-        instance_nodes: scene.bvh.instance_nodes.address(),
         counters: view.counters[slot].address(),
         exposure: view.exposure.address(),
-        focus: view.focus.address(),
-        srgb: scene.srgb_table.address(),
-        eye: input.camera.eye,
-        half_width,
-        forward: axes.forward.into(),
-        half_height,
-        right: axes.right.into(),
+        focus: view.focus[slot].address(),
         aperture: s.aperture,
-        up: axes.up.into(),
         cone: if s.filter_textures {
-            2.0 * half_width / size.0 as f32
+            2.0 * base.half_width / size.0 as f32
         } else {
             0.0
         },
-        size: [size.0, size.1],
         seed: s.seed,
         sequence: s.sequence as u32,
-        instance_count: scene.instance_count,
-        instance_root: scene.bvh.instance_root,
-        all_row: scene.all_row,
         cull_lights: s.cull_lights,
         random_lights: s.random_lights,
         soft_shadows: u32::from(s.soft_shadows),
@@ -165,5 +144,6 @@ fn frame_constants(scene: &SceneGpu, view: &mut ViewState, slot: usize, input: &
         view: s.view,
         fixed_exposure: s.exposure,
         exposure_blend: input.exposure_blend,
-    }
+        ..base
+    })
 }

@@ -2,6 +2,7 @@
 
 use super::backend::Backend;
 use super::bvh_upload::{MeshTrees, TreeError, instance_tree};
+use super::frame_constants::FrameConstants;
 use crate::assets::image::SRGB_TO_LINEAR;
 use crate::gpu::acceleration::{
     BottomDesc, BottomLevel, BuildPreference, BuildStatistics, TopInstance, TopLevel, TriangleGeometry,
@@ -12,6 +13,7 @@ use crate::gpu::{
 };
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
+use crate::scene::camera::Camera;
 use crate::scene::records::{Instance, TextureInfo};
 use ash::vk;
 use std::sync::Arc;
@@ -267,6 +269,42 @@ impl SceneGpu {
             layout,
             sets,
         })
+    }
+}
+
+impl SceneGpu {
+    /// Constants of a frame as far as scene and view decide them; the rest is zero.
+    pub fn constants(&self, camera: &Camera, size: (u32, u32)) -> FrameConstants {
+        let axes = camera.axes();
+        let (half_width, half_height) = camera.half_extent(size.0, size.1);
+        FrameConstants {
+            positions: self.positions.address(),
+            attributes: self.attributes.address(),
+            triangles: self.triangles.address(),
+            materials: self.materials.address(),
+            instances: self.instances.address(),
+            lights: self.lights.address(),
+            bsp_nodes: self.bsp_nodes.address(),
+            textures: self.texture_infos.address(),
+            mesh_trees: self.bvh.mesh_trees.address(),
+            cwbvh_nodes: self.bvh.cwbvh_nodes.address(),
+            cwbvh_triangles: self.bvh.cwbvh_triangles.address(),
+            bvh2_nodes: self.bvh.bvh2_nodes.address(),
+            bvh2_triangles: self.bvh.bvh2_triangles.address(),
+            instance_nodes: self.bvh.instance_nodes.address(),
+            srgb: self.srgb_table.address(),
+            eye: camera.eye,
+            half_width,
+            forward: axes.forward.into(),
+            half_height,
+            right: axes.right.into(),
+            up: axes.up.into(),
+            size: [size.0, size.1],
+            instance_count: self.instance_count,
+            instance_root: self.bvh.instance_root,
+            all_row: self.all_row,
+            ..FrameConstants::default()
+        }
     }
 }
 

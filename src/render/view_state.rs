@@ -17,7 +17,8 @@ pub struct ViewState {
     /// One set of constants per frame in flight.
     pub constants: Vec<Buffer>,
     pub exposure: Buffer,
-    pub focus: Buffer,
+    /// Distance in focus, one per frame in flight: the CPU writes a fixed one while an earlier frame may still run.
+    pub focus: Vec<Buffer>,
     /// One set of counters per frame in flight, visible to the CPU.
     pub counters: Vec<Buffer>,
 }
@@ -41,8 +42,10 @@ impl ViewState {
         };
         let mut exposure = Buffer::new(device, "exposure", 4, storage, MemoryKind::Upload)?;
         exposure.write(0, &[0f32])?;
-        let mut focus = Buffer::new(device, "focus", 4, storage, MemoryKind::Upload)?;
-        focus.write(0, &[0f32])?;
+        let mut focus = per_frame("focus", 4, MemoryKind::Upload)?;
+        for f in &mut focus {
+            f.write(0, &[0f32])?;
+        }
         let mut counters = per_frame("counters", COUNTER_WORDS * 4, MemoryKind::Readback)?;
         for c in &mut counters {
             c.write(0, &[0u32; COUNTER_WORDS as usize])?;
