@@ -147,9 +147,8 @@ fn dispatch() -> CliResult {
 /// Runs the program and returns its exit code: 0 done, 1 failed, 2 bad usage.
 pub fn run() -> ExitCode {
     // What the library has to say beside its errors: warnings, or what RUST_LOG asks for.
-    let filter = tracing_subscriber::EnvFilter::builder()
-        .with_default_directive(tracing::Level::WARN.into())
-        .from_env_lossy();
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("error,q3rays=warn"));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
