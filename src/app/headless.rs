@@ -7,17 +7,16 @@ use crate::content::fly_through;
 use crate::engine::{Engine, Job, Prepared};
 use crate::gpu::SubmitSync;
 use crate::output::stats::{FrameStats, RunStats, Summary};
-use crate::output::{atomic, png_file};
+use crate::output::{atomic, picture, stdout};
 use crate::reference::direct::RayCounts;
 use crate::render::film::Film;
 use crate::render::frame::FrameInput;
 use crate::render::gpu_renderer::film as read_film;
 use crate::render::realtime::Realtime;
 use crate::render::settings::Settings;
-use crate::render::tonemap::{automatic_exposure, display};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
-use crate::scene::spawns::{overview, view};
+use crate::scene::spawns::first_view;
 use std::path::Path;
 use std::time::Instant;
 
@@ -149,10 +148,7 @@ pub fn run(
             return fly_through::camera(index as f32 / FLIGHT as f32, fov);
         }
         // Other maps: a turn on the spot at the first spawn point.
-        let mut camera = scene
-            .spawns
-            .first()
-            .map_or_else(|| overview(&scene.bsp, fov), |s| view(s, fov));
+        let mut camera = first_view(&scene.spawns, &scene.bsp, fov);
         camera.yaw += 360.0 * index.min(FLIGHT) as f32 / FLIGHT as f32;
         camera
     };
@@ -163,31 +159,21 @@ pub fn run(
         path: &path,
         accumulate: true,
     };
-    let run = run_frames(&prepared, &job, progress, &|text| println!("{text}"))?;
+    let run = run_frames(&prepared, &job, progress, &|text| eprintln!("{text}"))?;
     let stats = run_stats(engine, cvars, &scene.name, SIZE, run.frames);
-    let exposure = if settings.exposure > 0.0 {
-        settings.exposure
-    } else {
-        automatic_exposure(&run.film.mean, SIZE.0, SIZE.1)
-    };
-    let pixels: Vec<_> = run
-        .film
-        .mean
-        .iter()
-        .map(|p| display(*p, exposure, settings.tonemap))
-        .collect();
     let picture = folder.join("frame.png");
     atomic::create_parent(&picture).map_err(CliError::failed)?;
-    png_file::write(&picture, SIZE.0, SIZE.1, &pixels).map_err(CliError::failed)?;
+    picture::write(&picture, &run.film, &settings).map_err(CliError::failed)?;
     let (json, csv) = (folder.join("stats.json"), folder.join("stats.csv"));
     stats.write(&json).map_err(CliError::failed)?;
     stats.write(&csv).map_err(CliError::failed)?;
-    println!(
+    let said = format!(
         "{} frames of {}x{}: median {:.2} ms, 95% {:.2} ms",
         FRAMES, SIZE.0, SIZE.1, stats.summary.p50, stats.summary.p95
     );
+    stdout::line(said).map_err(CliError::failed)?;
     for path in [picture, json, csv] {
-        println!("{}", path.display());
+        stdout::line(path.display()).map_err(CliError::failed)?;
     }
     Ok(())
 }

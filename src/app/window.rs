@@ -6,7 +6,7 @@ use crate::cli::CliError;
 use crate::console::Cvars;
 use crate::console::cvars::VIEWS;
 use crate::console::settings::settings;
-use crate::engine::{BackendChoice, describe, open_device};
+use crate::engine::{BackendChoice, open_device};
 use crate::gpu::{Access, Instance, InstanceOptions, PresentMode, SubmitSync, Surface, Swapchain, Use, ValidationMode};
 use crate::output::stats::{FrameStats, Summary};
 use crate::render::frame::FrameInput;
@@ -15,7 +15,7 @@ use crate::render::scene_gpu::SceneGpu;
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
-use crate::scene::spawns::{overview, view};
+use crate::scene::spawns::first_view;
 use ash::vk;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -126,7 +126,6 @@ impl Shown {
         let choice = BackendChoice::from_word(&options.cvars.get("rt_backend").unwrap_or_default());
         let device = options.device.as_deref().unwrap_or("auto");
         let (device, backend) = open_device(choice, device, &instance, Some(&surface)).map_err(CliError::failed)?;
-        println!("{}", describe(&device, backend, choice));
         if device.info().device_type == vk::PhysicalDeviceType::CPU {
             // The answer, where there is one at once, comes as a resize event otherwise.
             let _ = window.request_inner_size(PhysicalSize::new(SMALL_SIZE.0, SMALL_SIZE.1));
@@ -139,11 +138,7 @@ impl Shown {
         let realtime =
             Realtime::new(Arc::new(scene), (size.width.max(1), size.height.max(1)), None).map_err(CliError::failed)?;
         let fov = options.cvars.number("cg_fov") as f32;
-        let camera = options
-            .scene
-            .spawns
-            .first()
-            .map_or_else(|| overview(&options.scene.bsp, fov), |s| view(s, fov));
+        let camera = first_view(&options.scene.spawns, &options.scene.bsp, fov);
         Ok(Self {
             swapchain,
             realtime,
@@ -268,7 +263,7 @@ impl Shown {
                 .iter()
                 .map(|(name, ms)| format!("{name} {:.2}", ms.as_f64().unwrap_or(0.0)))
                 .collect();
-            println!(
+            eprintln!(
                 "p50 {:.2} p95 {:.2} p99 {:.2} ms; {}",
                 s.p50,
                 s.p95,

@@ -7,7 +7,7 @@ use crate::bench::ray_report::{MOST_DISAGREEMENT, RaysReport};
 use crate::bench::rays::{EYE_JITTER, RaysBench, RaysOptions};
 use crate::console::Cvars;
 use crate::engine::Engine;
-use crate::output::atomic;
+use crate::output::{atomic, stdout};
 use crate::render::backend::Backend;
 use crate::render::scene_gpu::SceneGpu;
 use crate::scene::bvh::BvhQuality;
@@ -110,7 +110,7 @@ fn rays(common: &Common, cvars: &Cvars, args: &RaysArgs) -> CliResult {
         bar.finish_and_clear();
         report.maps.push(measured);
     }
-    print!("{report}");
+    stdout::line(&report).map_err(CliError::failed)?;
     if let Some(path) = &args.json {
         let text = serde_json::to_string_pretty(&report).map_err(CliError::failed)?;
         atomic::write(path, text.as_bytes()).map_err(CliError::failed)?;

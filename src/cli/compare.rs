@@ -3,7 +3,7 @@
 use super::args::{CliError, CliResult};
 use crate::assets::image::decode_srgb;
 use crate::metrics::{ImageRgb, Kind, compare, heatmap};
-use crate::output::{exr_file, png_file};
+use crate::output::{exr_file, png_file, stdout};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `compare`.
@@ -81,6 +81,5 @@ pub fn run(args: &Args) -> CliResult {
         let map = heatmap(&a, &b, kind_a).map_err(CliError::failed)?;
         png_file::write(path, a.width as u32, a.height as u32, &map).map_err(CliError::failed)?;
     }
-    println!("{}", serde_json::to_string_pretty(&metrics).map_err(CliError::failed)?);
-    Ok(())
+    stdout::line(serde_json::to_string_pretty(&metrics).map_err(CliError::failed)?).map_err(CliError::failed)
 }

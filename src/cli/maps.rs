@@ -1,7 +1,8 @@
 //! `q3rays maps`
 
-use super::args::CliResult;
+use super::args::{CliError, CliResult};
 use super::common::Common;
+use crate::output::stdout;
 
 /// Arguments of `maps`.
 #[derive(clap::Args)]
@@ -12,7 +13,7 @@ pub fn run(common: &Common, _: &Args) -> CliResult {
     let maps = common.files()?.maps();
     let width = maps.iter().map(|m| m.name.len()).max().unwrap_or(0);
     for map in &maps {
-        println!("{:width$}  {}", map.name, map.place);
+        stdout::line(format_args!("{:width$}  {}", map.name, map.place)).map_err(CliError::failed)?;
     }
     Ok(())
 }

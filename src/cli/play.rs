@@ -6,6 +6,7 @@ use crate::app::{headless, window};
 use crate::console::Cvars;
 use crate::content::fly_through;
 use crate::engine::Engine;
+use crate::output::stdout;
 use std::path::Path;
 
 /// Map that is played where none is named.
@@ -27,15 +28,11 @@ pub struct Args {
 pub fn run(common: &Common, cvars: Cvars, args: Args, map: Option<String>) -> CliResult {
     let map = args.map.or(map).unwrap_or_else(|| DEFAULT_MAP.to_owned());
     let scene = common.scene(&map)?;
-    if window::has_display() && cvars.get("rt_backend").as_deref() != Some("cpu") {
-        let engine = Engine::choose(
-            crate::engine::BackendChoice::from_word(&cvars.get("rt_backend").unwrap_or_default()),
-            common.device.as_deref(),
-            crate::gpu::ValidationMode::Off,
-        )
-        .map_err(CliError::failed)?;
-        if let Engine::Vulkan { device, .. } = engine.engine {
-            drop(device);
+    let engine = common.engine(&cvars)?;
+    match engine {
+        Engine::Vulkan { .. } if window::has_display() => {
+            // The window needs a device that can present, which is opened with it.
+            drop(engine);
             return window::run(window::Options {
                 scene,
                 cvars,
@@ -43,12 +40,10 @@ pub fn run(common: &Common, cvars: Cvars, args: Args, map: Option<String>) -> Cl
                 frames: args.frames,
             });
         }
-        println!("{}", engine.line);
-        println!("the window needs a Vulkan device, so this run goes without one");
-    } else {
-        println!("no display (or the CPU tracer asked for): running without a window");
+        Engine::Vulkan { .. } => stdout::line("no display: running without a window"),
+        Engine::Cpu => stdout::line("the window needs a Vulkan device: running without one"),
     }
-    let engine = common.engine(&cvars)?;
+    .map_err(CliError::failed)?;
     let bar = progress(1000, &map);
     let done = headless::run(&engine, &scene, &cvars, Path::new(OUT), &|share| {
         bar.set_position((share * 1000.0) as u64);

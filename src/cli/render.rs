@@ -7,11 +7,9 @@ use crate::console::Cvars;
 use crate::console::settings::settings;
 use crate::engine::Job;
 use crate::output::stats::FrameStats;
-use crate::output::{OutputError, atomic, exr_file, png_file};
+use crate::output::{OutputError, atomic, exr_file, picture};
 use crate::reference::direct::RayCounts;
 use crate::render::film::{Aovs, Film};
-use crate::render::settings::Settings;
-use crate::render::tonemap::{automatic_exposure, display};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::spawns::{overview, view};
@@ -120,27 +118,6 @@ pub fn camera(scene: &Scene, camera: Option<&str>, spawn: Option<usize>, fov: f3
     }
 }
 
-fn write_image(path: &Path, film: &Film, settings: &Settings) -> Result<(), OutputError> {
-    let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("exr") => exr_file::write_film(path, film, &[]),
-        Some("png") => {
-            let exposure = if settings.exposure > 0.0 {
-                settings.exposure
-            } else {
-                automatic_exposure(&film.mean, film.width, film.height)
-            };
-            let pixels: Vec<_> = film
-                .mean
-                .iter()
-                .map(|p| display(*p, exposure, settings.tonemap))
-                .collect();
-            png_file::write(path, film.width, film.height, &pixels)
-        }
-        _ => Err(OutputError::Extension { path: path.to_owned() }),
-    }
-}
-
 fn write_aovs(folder: &Path, film: &Film, aovs: &Aovs) -> Result<(), OutputError> {
     std::fs::create_dir_all(folder).map_err(|source| OutputError::Write {
         path: folder.to_owned(),
@@ -239,7 +216,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     if film.non_finite() > 0 {
         eprintln!("warning: {} pixels are not finite", film.non_finite());
     }
-    write_image(&args.out, &film, &settings).map_err(CliError::failed)?;
+    picture::write(&args.out, &film, &settings).map_err(CliError::failed)?;
     if let Some(path) = &args.stats {
         let stats = run_stats(&engine, &cvars, &args.map, args.size, frames);
         stats.write(path).map_err(CliError::failed)?;

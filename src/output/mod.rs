@@ -2,8 +2,10 @@
 
 pub mod atomic;
 pub mod exr_file;
+pub mod picture;
 pub mod png_file;
 pub mod stats;
+pub mod stdout;
 
 use std::path::PathBuf;
 use thiserror::Error;

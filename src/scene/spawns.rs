@@ -43,6 +43,13 @@ pub fn view(spawn: &Spawn, fov: f32) -> Camera {
     Camera::new(Vec3::from(spawn.origin) + Vec3::Z * EYE_HEIGHT, spawn.angle, fov)
 }
 
+/// The view from the first spawn point, or an overview of a map without any.
+pub fn first_view(spawns: &[Spawn], bsp: &Bsp, fov: f32) -> Camera {
+    spawns
+        .first()
+        .map_or_else(|| overview(bsp, fov), |spawn| view(spawn, fov))
+}
+
 /// A view for maps without any spawn point: the middle of the bounds, moved into the nearest open leaf.
 pub fn overview(bsp: &Bsp, fov: f32) -> Camera {
     let centre = bsp.world_bounds().centre();
