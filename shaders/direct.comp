@@ -8,24 +8,13 @@
 #include "trace.glsl"
 #include "surface.glsl"
 #include "light_sample.glsl"
+#include "light_choice.glsl"
 #include "gbuffer.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
 shared uint shadow_rays;
 shared uint shadow_skipped;
-
-// Number of the k-th light of a row.
-uint kth_light(LightRow row, uint k) {
-    uint lo = 0;
-    uint hi = row.run_count;
-    [[dont_unroll]] while (hi - lo > 1) {
-        uint mid = (lo + hi) >> 1;
-        if (FC.light_runs.at[row.first_run + mid].before <= k) lo = mid; else hi = mid;
-    }
-    LightRun run = FC.light_runs.at[row.first_run + lo];
-    return run.first_light + (k - run.before);
-}
 
 bool visible(SurfaceHit at, LightSample s) {
     vec3 origin = offset_point(at.position, at.geometric_normal);
@@ -36,15 +25,47 @@ bool visible(SurfaceHit at, LightSample s) {
     return (FC.materials.at[FC.triangles.at[hit.triangle].material].flags & MATERIAL_SKY) != 0;
 }
 
-vec3 sample_one(uint light, uint dimension, uint address, SurfaceHit at, inout uvec2 counts) {
-    vec2 u = sample2(FC.sequence, random_key(FC.seed, address, dimension), sample_index);
-    LightSample s = sample_light(FC.lights.at[light], at, u, FC.soft_shadows != 0);
+uvec2 random_bits(uint address, uint dimension) {
+    return bits2(FC.sequence, random_key(FC.seed, address, dimension), sample_index);
+}
+
+LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at) {
+    uvec2 bits = random_bits(address, dimension);
+    vec2 u = vec2(unit_float(bits.x), unit_float(bits.y));
+    return sample_light(FC.lights.at[light], at, u, FC.soft_shadows != 0);
+}
+
+vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
     if (max(s.value.x, max(s.value.y, s.value.z)) <= 0.0) {
         counts.y++;
         return vec3(0.0);
     }
     counts.x++;
     return visible(at, s) ? s.value : vec3(0.0);
+}
+
+// One light resampled from candidates in proportion to what they give without visibility.
+vec3 resampled(LightRow row, uint i, uint address, SurfaceHit at, inout uvec2 counts) {
+    uint n = clamp(FC.light_candidates, 1, MAX_CANDIDATES);
+    LightSample kept = LightSample(vec3(0.0), vec3(0.0), false);
+    float kept_target = 0.0;
+    float sum = 0.0;
+    [[dont_unroll]] for (uint c = i * MAX_CANDIDATES; c < i * MAX_CANDIDATES + n; c++) {
+        uvec2 bits = random_bits(address, DIM_CANDIDATE_PICK + c);
+        Choice choice = choose_light(FC.light_sampling, row, at, bits.x);
+        if (choice.light == NONE) continue;
+        LightSample s = sampled(choice.light, DIM_CANDIDATE_POINT + c, address, at);
+        float target = luminance(s.value);
+        if (!(target > 0.0)) continue;
+        float weight = target / choice.probability;
+        sum += weight;
+        if (unit_float(bits.y) * sum < weight) {
+            kept = s;
+            kept_target = target;
+        }
+    }
+    vec3 value = traced(kept, at, counts);
+    return kept_target > 0.0 ? value * (sum / (kept_target * float(n))) : vec3(0.0);
 }
 
 vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
@@ -54,16 +75,21 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
         [[dont_unroll]] for (uint r = 0; r < row.run_count; r++) {
             LightRun run = FC.light_runs.at[row.first_run + r];
             [[dont_unroll]] for (uint light = run.first_light; light < run.first_light + run.count; light++) {
-                sum += sample_one(light, DIM_EVERY_LIGHT + light, address, at, counts);
+                sum += traced(sampled(light, DIM_EVERY_LIGHT + light, address, at), at, counts);
             }
         }
-    } else if (row.light_count > 0) {
-        float weight = float(row.light_count) / float(FC.random_lights);
-        [[dont_unroll]] for (uint i = 0; i < FC.random_lights; i++) {
-            float u = sample2(FC.sequence, random_key(FC.seed, address, DIM_LIGHT_PICK + i), sample_index).x;
-            uint k = min(uint(u * float(row.light_count)), row.light_count - 1);
-            sum += sample_one(kth_light(row, k), DIM_LIGHT_POINT + i, address, at, counts) * weight;
+        return sum;
+    }
+    float share = 1.0 / float(FC.random_lights);
+    [[dont_unroll]] for (uint i = 0; i < FC.random_lights; i++) {
+        if (FC.light_sampling == SAMPLING_RESERVOIR) {
+            sum += resampled(row, i, address, at, counts) * share;
+            continue;
         }
+        Choice choice = choose_light(FC.light_sampling, row, at, random_bits(address, DIM_LIGHT_PICK + i).x);
+        if (choice.light == NONE) continue;
+        LightSample s = sampled(choice.light, DIM_LIGHT_POINT + i, address, at);
+        sum += traced(s, at, counts) * (share / choice.probability);
     }
     return sum;
 }

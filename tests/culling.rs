@@ -208,6 +208,7 @@ fn level_0_does_not_read_the_pvs() {
                     first_run: 0,
                     run_count: 0,
                     light_count: 0,
+                    weight: 0,
                 };
                 let all = emptied.rows.all_row as usize;
                 lists.rows[..all].fill(nothing);

@@ -6,7 +6,7 @@ mod common;
 mod gpu_fixture;
 
 use common::analytic::{
-    ceiling_light, emitter_on_floor, emitter_radiance, floor_emitter, point_light, polygon, sunlit,
+    ceiling_light, emitter_on_floor, emitter_radiance, floor_emitter, point_light, polygon, sunlit, under_dome,
 };
 use common::{blocks, camera, gpu_film, mean_and_error, quiet, scene, still};
 use glam::{DVec3, Vec3};
@@ -190,6 +190,17 @@ fn a_sun() {
             light
         });
     }
+}
+
+#[test]
+fn a_sky_dome() {
+    let scene = scene(&under_dome(200));
+    let lit = camera([80.3, 40.6, 60.2], 88.0, 0.4, 60.0);
+    // As many suns in every degree of elevation: the mean sine is 2/π.
+    agree_on_cpu("sky dome", &scene, &lit, |_, n| {
+        assert!(n.z > 0.9);
+        200.0 / 255.0 * 2.0 / std::f64::consts::PI
+    });
 }
 
 #[test]

@@ -14,6 +14,7 @@ use q3rays::reference::CpuRenderer;
 use q3rays::render::backend::Backend;
 use q3rays::render::film::Film;
 use q3rays::render::scene_gpu::SceneGpu;
+use q3rays::render::settings::LightSampling;
 use q3rays::scene::bvh::BvhQuality;
 use q3rays::scene::camera::Camera;
 use q3rays::scene::sampling::Sequence;
@@ -122,19 +123,33 @@ fn random_lights_have_the_mean_of_all() {
     for (what, fixture, camera) in cases() {
         let scene = scene(&fixture);
         let cpu = CpuRenderer::new(&scene);
-        let film = |lights: u32, cull: u32, seed: u32, samples: u32| {
-            let mut settings = still(lights, Sequence::Random, 100_000 * (lights + 1) + 1000 * cull + seed);
+        let film = |sampling: LightSampling, lights: u32, cull: u32, seed: u32, samples: u32| {
+            let apart = 1_000_000 * sampling as u32 + 100_000 * (lights + 1) + 1000 * cull;
+            let mut settings = still(lights, Sequence::Random, apart + seed);
             settings.cull_lights = cull;
+            settings.light_sampling = sampling;
             cpu.accumulate(&camera, SIZE, &settings, 0..samples, &quiet).0
         };
-        let all = measure(0..4 * SEEDS, 16, &|seed, samples| film(0, 0, seed, samples));
+        let all = measure(0..4 * SEEDS, 16, &|seed, samples| {
+            film(LightSampling::Uniform, 0, 0, seed, samples)
+        });
         assert!(
             all[all.len() - 1].0 > 0.0,
             "{what}: a view without light would prove nothing"
         );
-        for (lights, cull) in [(1, 0), (1, 1), (1, 2), (2, 1), (4, 1)] {
-            let name = format!("{what}, {lights} lights, rt_cullLights {cull}");
-            let film: Accumulate = &|seed, samples| film(lights, cull, seed, samples);
+        for (sampling, lights, cull) in [
+            (LightSampling::Uniform, 1, 0),
+            (LightSampling::Uniform, 4, 1),
+            (LightSampling::Power, 1, 1),
+            (LightSampling::Power, 2, 2),
+            (LightSampling::Bvh, 1, 0),
+            (LightSampling::Bvh, 1, 1),
+            (LightSampling::Bvh, 2, 2),
+            (LightSampling::Reservoir, 1, 1),
+            (LightSampling::Reservoir, 2, 0),
+        ] {
+            let name = format!("{what}, {lights} lights, {sampling:?}, rt_cullLights {cull}");
+            let film: Accumulate = &|seed, samples| film(sampling, lights, cull, seed, samples);
             same_mean(&name, 32 / lights, film, &all);
         }
     }
@@ -146,17 +161,31 @@ fn random_lights_have_the_mean_of_all_on_the_gpu() {
         let fixture = chain(5, Doorways::Staggered, 1000).unwrap();
         let (scene, camera) = (scene(&fixture), camera([230.3, 70.6, 60.2], 8.0, 2.0, 90.0));
         let gpu = SceneGpu::new(device, &scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
-        let film = |lights: u32, seed: u32, samples: u32| {
-            let settings = still(lights, Sequence::Random, 1000 * lights + seed);
+        let film = |sampling: LightSampling, lights: u32, seed: u32, samples: u32| {
+            let mut settings = still(
+                lights,
+                Sequence::Random,
+                10_000 * sampling as u32 + 1000 * lights + seed,
+            );
+            settings.light_sampling = sampling;
             gpu_film(&gpu, &camera, SIZE, &settings, samples)
         };
-        let all = measure(0..SEEDS, 4, &|seed, samples| film(0, seed, samples));
-        same_mean(
-            "chain on the GPU, 2 lights",
-            16,
-            &|seed, samples| film(2, seed, samples),
-            &all,
-        );
+        let all = measure(0..SEEDS, 4, &|seed, samples| {
+            film(LightSampling::Uniform, 0, seed, samples)
+        });
+        for sampling in [
+            LightSampling::Uniform,
+            LightSampling::Power,
+            LightSampling::Bvh,
+            LightSampling::Reservoir,
+        ] {
+            same_mean(
+                &format!("chain on the GPU, 2 lights, {sampling:?}"),
+                16,
+                &|seed, samples| film(sampling, 2, seed, samples),
+                &all,
+            );
+        }
     });
 }
 

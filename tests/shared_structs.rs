@@ -4,7 +4,7 @@
 use q3rays::render::bvh_upload::MeshTree;
 use q3rays::render::frame_constants::{FrameConstants, Push};
 use q3rays::scene::records::{
-    BspNode, Instance, Light, LightRow, LightRun, Material, TextureInfo, Triangle, VertexAttributes,
+    BspNode, Instance, Light, LightNode, LightRow, LightRun, Material, TextureInfo, Triangle, VertexAttributes,
 };
 use std::collections::{BTreeMap, HashMap};
 use std::mem::offset_of;
@@ -131,12 +131,24 @@ fn records() -> Vec<Record> {
         record!(LightRow {
             first_run,
             run_count,
-            light_count
+            light_count,
+            weight,
         }),
         record!(LightRun {
             first_light,
             count,
-            before
+            before,
+            weight_before,
+        }),
+        record!(LightNode {
+            centre,
+            cos_cone,
+            half_size,
+            front,
+            axis,
+            first,
+            count,
+            right,
         }),
         record!(TextureInfo { width, height, levels }),
         record!(MeshTree {
@@ -159,6 +171,8 @@ fn records() -> Vec<Record> {
             bsp_nodes,
             light_rows,
             light_runs,
+            light_nodes,
+            light_weights,
             textures,
             mesh_trees,
             cwbvh_nodes,
@@ -186,13 +200,17 @@ fn records() -> Vec<Record> {
             all_row,
             cull_lights,
             random_lights,
+            light_sampling,
+            light_candidates,
+            finite_lights,
             soft_shadows,
             antialiasing,
             illumination,
             tonemap,
             view,
             fixed_exposure,
-            exposure_blend
+            exposure_blend,
+            padding
         }),
         record!(Push {
             frame,

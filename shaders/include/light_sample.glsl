@@ -2,7 +2,12 @@
 #ifndef LIGHT_SAMPLE_GLSL
 #define LIGHT_SAMPLE_GLSL
 
+#include "precise.glsl"
+
 const float PI = 3.14159265358979;
+const float SMALL_SOLID_ANGLE = 2e-3;
+const float SMALL_SINE = 0.03;
+const float LARGE_SOLID_ANGLE = 0.3;
 
 struct LightSample {
     // Contribution to irradiance/π without visibility; zero where there is none.
@@ -25,22 +30,150 @@ void tangents(vec3 n, out vec3 t1, out vec3 t2) {
     t2 = vec3(b, s + n.y * n.y * a, -n.y);
 }
 
-LightSample sample_triangle_light(Light light, SurfaceHit at, vec2 u, bool soft) {
-    LightSample r = LightSample(vec3(0.0), vec3(0.0), false);
-    vec2 b = soft ? sample_triangle_barycentrics(u) : vec2(1.0 / 3.0);
-    vec3 point = light.p0 + light.p1 * b.x + light.p2 * b.y;
-    vec3 to_light = point - at.position;
+// How to sample a triangle by solid angle: see src/reference/light_sample.rs.
+const uint SPHERICAL_UNIFORM = 0;
+const uint SPHERICAL_AROUND = 1;
+const uint SPHERICAL_SMALL = 2;
+
+struct SphericalSample {
+    uint kind;
+    vec3 direction;
+    float solid_angle;
+};
+
+SphericalSample spherical_triangle(vec3 a, vec3 b, vec3 c, float volume, vec2 u) {
+    float length_a = length(a);
+    float length_b = length(b);
+    float length_c = length(c);
+    a /= length_a;
+    b /= length_b;
+    c /= length_c;
+    float ab = dot(a, b);
+    float bc = dot(b, c);
+    float ca = dot(c, a);
+    float triple = abs(volume) / (length_a * length_b * length_c);
+    float solid_angle = 2.0 * precise_angle(triple, 1.0 + ab + bc + ca);
+    // The longest edge is put opposite to a, whose own edges are then far from half a turn.
+    if (ca < bc && ca < ab) {
+        vec3 first = a;
+        a = b;
+        b = c;
+        c = first;
+        float first_ab = ab;
+        ab = bc;
+        ca = first_ab;
+    } else if (ab < bc) {
+        vec3 first = a;
+        a = c;
+        c = b;
+        b = first;
+        ab = ca;
+        ca = bc;
+    }
+    vec3 tb = b - a * ab;
+    vec3 tc = c - a * ca;
+    float lb = length(tb);
+    float lc = length(tc);
+    float cos_alpha = clamp(dot(tb, tc) / (lb * lc), -1.0, 1.0);
+    float sin_alpha = triple / (lb * lc);
+    bool usable = sin_alpha > SMALL_SINE;
+    if (solid_angle <= (usable ? SMALL_SOLID_ANGLE : LARGE_SOLID_ANGLE)) {
+        return SphericalSample(SPHERICAL_SMALL, vec3(0.0), 0.0);
+    }
+    if (!usable) return SphericalSample(SPHERICAL_AROUND, vec3(0.0), 0.0);
+    vec2 half_area = precise_sin_cos(0.5 * solid_angle * u.x);
+    float tan_ab = lb / (1.0 + ab);
+    float x = half_area.x / (tan_ab * (sin_alpha * half_area.y - cos_alpha * half_area.x));
+    vec3 on_edge = (a * (1.0 - x * x) + tc * (2.0 * x / lc)) / (1.0 + x * x);
+    vec3 chord = on_edge - b;
+    float versine = 0.5 * dot(chord, chord);
+    float drop = u.y * versine;
+    vec3 across = chord + b * versine;
+    float len = length(across);
+    vec3 direction = b;
+    if (len > 0.0) direction = b * (1.0 - drop) + across * (sqrt(max(drop * (2.0 - drop), 0.0)) / len);
+    return SphericalSample(SPHERICAL_UNIFORM, normalize(direction), solid_angle);
+}
+
+struct TrianglePoint {
+    vec2 barycentrics;
+    vec3 position;
+    vec3 direction;
+    // On the side of the receiver.
+    vec3 normal;
+    // Contribution per radiance; 0 where there is none.
+    float factor;
+};
+
+const float SMALL_EDGE_2 = 0.04;
+
+TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, bool soft) {
+    TrianglePoint r;
+    r.factor = 0.0;
+    vec3 e1 = light.p1;
+    vec3 e2 = light.p2;
+    r.normal = cross(e1, e2);
+    float volume = dot(r.normal, at.position - light.p0);
+    r.normal = normalize(r.normal);
+    if (volume <= 0.0) {
+        if ((light.flags & LIGHT_TWO_SIDED) == 0) return r;
+        r.normal = -r.normal;
+    }
+    vec3 to_middle = light.p0 + (e1 + e2) * (1.0 / 3.0) - at.position;
+    if (soft && max(dot(e1, e1), dot(e2, e2)) > SMALL_EDGE_2 * dot(to_middle, to_middle)) {
+        vec3 to = light.p0 - at.position;
+        SphericalSample s = spherical_triangle(to, light.p0 + e1 - at.position, light.p0 + e2 - at.position, volume, u);
+        if (s.kind != SPHERICAL_SMALL) {
+            if (s.kind == SPHERICAL_UNIFORM) {
+                r.direction = s.direction;
+            } else {
+                vec2 d = sample_disc(u);
+                vec3 t1, t2;
+                tangents(at.shading_normal, t1, t2);
+                r.direction = t1 * d.x + t2 * d.y + at.shading_normal * sqrt(max(1.0 - d.x * d.x - d.y * d.y, 0.0));
+            }
+            vec3 across = cross(r.direction, e2);
+            float determinant = dot(e1, across);
+            if (determinant == 0.0) return r;
+            vec3 from = at.position - light.p0;
+            float b1 = dot(from, across) / determinant;
+            float b2 = dot(r.direction, cross(from, e1)) / determinant;
+            if (s.kind == SPHERICAL_AROUND) {
+                bool met = b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && dot(r.direction, r.normal) < 0.0;
+                r.factor = met && receiver_cosine(at, r.direction) > 0.0 ? 1.0 : 0.0;
+            } else {
+                b1 = clamp(b1, 0.0, 1.0);
+                b2 = clamp(b2, 0.0, 1.0 - b1);
+                r.factor = receiver_cosine(at, r.direction) * s.solid_angle / PI;
+            }
+            r.barycentrics = vec2(b1, b2);
+            r.position = light.p0 + e1 * b1 + e2 * b2;
+            return r;
+        }
+    }
+    r.barycentrics = soft ? sample_triangle_barycentrics(u) : vec2(1.0 / 3.0);
+    r.position = light.p0 + e1 * r.barycentrics.x + e2 * r.barycentrics.y;
+    vec3 to_light = r.position - at.position;
     float d2 = dot(to_light, to_light);
     if (d2 <= 0.0) return r;
-    vec3 direction = to_light / sqrt(d2);
-    float cos_receiver = receiver_cosine(at, direction);
-    vec3 normal = normalize(cross(light.p1, light.p2));
-    float cos_light = -dot(normal, direction);
-    bool two_sided = (light.flags & LIGHT_TWO_SIDED) != 0;
-    if (cos_receiver <= 0.0 || (cos_light <= 0.0 && !two_sided) || cos_light == 0.0) return r;
-    vec3 radiance = emitted(FC.materials.at[light.material], uv_at(light.triangle, b), direction);
-    r.value = radiance * (cos_receiver * abs(cos_light) * light.size / (PI * d2));
-    r.target = offset_point(point, cos_light > 0.0 ? normal : -normal);
+    r.direction = to_light / sqrt(d2);
+    r.factor = receiver_cosine(at, r.direction) * max(-dot(r.normal, r.direction), 0.0) * light.size / (PI * d2);
+    return r;
+}
+
+LightSample sample_triangle_light(Light light, SurfaceHit at, vec2 u, bool soft) {
+    LightSample r = LightSample(vec3(0.0), vec3(0.0), false);
+    TrianglePoint p = triangle_point(light, at, u, soft);
+    if (!(p.factor > 0.0)) return r;
+    if (light.kind == LIGHT_DOME) {
+        if (p.direction.z <= 0.0) return r;
+        float cos_elevation = sqrt(max(1.0 - p.direction.z * p.direction.z, 1e-8));
+        r.value = light.radiance * (p.factor / (PI * cos_elevation));
+    } else {
+        vec2 uv = uv_at(light.triangle, p.barycentrics);
+        r.value = emitted(FC.materials.at[light.material], uv, p.direction) * p.factor;
+    }
+    r.target = offset_point(p.position, p.normal);
     return r;
 }
 
@@ -92,15 +225,13 @@ LightSample sky_sample(SurfaceHit at, float azimuth, float elevation, vec3 value
 
 LightSample sample_light(Light light, SurfaceHit at, vec2 u, bool soft) {
     LightSample r;
-    if (light.kind == LIGHT_TRIANGLE) {
+    if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_DOME) {
         r = sample_triangle_light(light, at, u, soft);
     } else if (light.kind == LIGHT_SPHERE) {
         r = sample_sphere_light(light, at, u, soft);
-    } else if (light.kind == LIGHT_SUN) {
+    } else {
         vec2 p = soft ? sample_disc(u) : vec2(0.0);
         r = sky_sample(at, light.p1.x + p.x * light.p1.z, light.p1.y + p.y * light.p1.z, light.radiance);
-    } else {
-        r = sky_sample(at, 2.0 * PI * u.x, 0.5 * PI * u.y, light.radiance);
     }
     // A value that is not finite would stay in every history it enters: it is rejected where it arises.
     if (any(isnan(r.value)) || any(isinf(r.value))) r.value = vec3(0.0);

@@ -7,6 +7,9 @@ const uint DIM_PIXEL = 0;
 const uint DIM_LENS = 1;
 const uint DIM_LIGHT_PICK = 16;
 const uint DIM_LIGHT_POINT = 80;
+const uint DIM_CANDIDATE_PICK = 0x1000;
+const uint DIM_CANDIDATE_POINT = 0x2000;
+const uint MAX_CANDIDATES = 32;
 const uint DIM_EVERY_LIGHT = 0x10000;
 
 uint pcg(uint x) {
@@ -47,15 +50,20 @@ float unit_float(uint bits) {
     return float(bits >> 8) * (1.0 / 16777216.0);
 }
 
-vec2 sample2(uint sequence, uint key, uint index) {
+uvec2 bits2(uint sequence, uint key, uint index) {
     if (sequence == SEQUENCE_RANDOM) {
         uint a = pcg(key ^ pcg(index));
-        return vec2(unit_float(a), unit_float(pcg(a ^ ((key << 16) | (key >> 16)))));
+        return uvec2(a, pcg(a ^ ((key << 16) | (key >> 16))));
     }
     uint shuffled = owen(index, key);
     uint x = owen(bitfieldReverse(shuffled), pcg(key ^ 0x68bc21ebu));
     uint y = owen(sobol1(shuffled), pcg(key ^ 0x02e5be93u));
-    return vec2(unit_float(x), unit_float(y));
+    return uvec2(x, y);
+}
+
+vec2 sample2(uint sequence, uint key, uint index) {
+    uvec2 bits = bits2(sequence, key, index);
+    return vec2(unit_float(bits.x), unit_float(bits.y));
 }
 
 vec2 sample_disc(vec2 u) {

@@ -77,12 +77,25 @@ struct LightRow {
     uint first_run;
     uint run_count;
     uint light_count;
+    uint weight;
 };
 
 struct LightRun {
     uint first_light;
     uint count;
     uint before;
+    uint weight_before;
+};
+
+struct LightNode {
+    vec3 centre;
+    float cos_cone;
+    vec3 half_size;
+    float front;
+    vec3 axis;
+    uint first;
+    uint count;
+    uint right;
 };
 
 // Size of a texture: queries of the texture itself cost more, and some drivers answer them wrongly for an index that
@@ -114,6 +127,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lig
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRows { LightRow at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRuns { LightRun at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightNodes { LightNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightWeights { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TextureInfos { TextureInfo at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MeshTrees { MeshTree at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Words4 { uvec4 at[]; };
@@ -132,6 +147,8 @@ struct FrameConstants {
     BspNodes bsp_nodes;
     LightRows light_rows;
     LightRuns light_runs;
+    LightNodes light_nodes;
+    LightWeights light_weights;
     TextureInfos textures;
     MeshTrees mesh_trees;
     Words4 cwbvh_nodes;
@@ -159,6 +176,9 @@ struct FrameConstants {
     uint all_row;
     uint cull_lights;
     uint random_lights;
+    uint light_sampling;
+    uint light_candidates;
+    uint finite_lights;
     uint soft_shadows;
     uint antialiasing;
     uint illumination;
@@ -166,6 +186,7 @@ struct FrameConstants {
     uint view;
     float fixed_exposure;
     float exposure_blend;
+    uint padding;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

@@ -2,14 +2,12 @@
 #ifndef TONEMAP_GLSL
 #define TONEMAP_GLSL
 
+#include "luminance.glsl"
+
 const float KEY = 0.18;
 const float LUMINANCE_FLOOR = 1e-4;
 const uint EXPOSURE_CELLS = 32;
 const vec2 EXPOSURE_RANGE = vec2(0.05, 16.0);
-
-float luminance(vec3 c) {
-    return dot(c, vec3(0.2126, 0.7152, 0.0722));
-}
 
 vec3 tone_map(vec3 x, uint curve) {
     if (curve == 0) return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);

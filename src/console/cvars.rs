@@ -140,8 +140,16 @@ pub const CVARS: &[Cvar] = &[
     ),
     choice(
         "rt_lightSampling",
-        &["uniform"],
-        "how a random light is chosen from the receiver's list",
+        &["bvh", "uniform", "power", "reservoir"],
+        "how a random light is chosen from the receiver's list: by a tree with an eye to distance and angle, all alike, by \
+         power, or the tree's candidates resampled by what they would contribute",
+    ),
+    int(
+        "rt_lightCandidates",
+        4,
+        1,
+        32,
+        "candidates per random light with rt_lightSampling reservoir",
     ),
     int("rt_seed", 0, 0, 0xffff_ffff, "seed of all random numbers"),
     int("rt_printPerfStats", 0, 0, 1, "prints times per pass every second"),

@@ -1,7 +1,7 @@
 //! From console variables to the settings of a frame.
 
 use super::Cvars;
-use crate::render::settings::{Settings, Tonemap};
+use crate::render::settings::{LightSampling, Settings, Tonemap};
 use crate::scene::sampling::Sequence;
 
 /// The frame settings that the variables ask for.
@@ -12,6 +12,13 @@ pub fn settings(cvars: &Cvars) -> Settings {
         illumination: on("rt_illumination"),
         cull_lights: number("rt_cullLights") as u32,
         random_lights: number("rt_numRandomDL") as u32,
+        light_sampling: match number("rt_lightSampling") as u32 {
+            1 => LightSampling::Uniform,
+            2 => LightSampling::Power,
+            3 => LightSampling::Reservoir,
+            _ => LightSampling::Bvh,
+        },
+        candidates: number("rt_lightCandidates") as u32,
         soft_shadows: on("rt_softshadows"),
         antialiasing: on("rt_antialiasing"),
         aperture: if on("rt_dof") {

@@ -4,6 +4,7 @@
 //! done in double precision.
 
 pub mod direct;
+pub mod light_choice;
 pub mod light_sample;
 pub mod primary;
 pub mod renderer;

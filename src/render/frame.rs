@@ -137,6 +137,8 @@ fn frame_constants(
         sequence: s.sequence as u32,
         cull_lights: s.cull_lights,
         random_lights: s.random_lights,
+        light_sampling: s.light_sampling as u32,
+        light_candidates: s.candidates,
         soft_shadows: u32::from(s.soft_shadows),
         antialiasing: u32::from(s.antialiasing),
         illumination: u32::from(s.illumination),

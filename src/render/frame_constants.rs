@@ -16,6 +16,9 @@ pub struct FrameConstants {
     pub bsp_nodes: u64,
     pub light_rows: u64,
     pub light_runs: u64,
+    pub light_nodes: u64,
+    /// Prefix sums of the lights' weights.
+    pub light_weights: u64,
     pub textures: u64,
     pub mesh_trees: u64,
     pub cwbvh_nodes: u64,
@@ -46,6 +49,11 @@ pub struct FrameConstants {
     pub all_row: u32,
     pub cull_lights: u32,
     pub random_lights: u32,
+    pub light_sampling: u32,
+    /// Candidates per random light where they are resampled.
+    pub light_candidates: u32,
+    /// Lights in the tree; suns follow.
+    pub finite_lights: u32,
     pub soft_shadows: u32,
     pub antialiasing: u32,
     pub illumination: u32,
@@ -55,6 +63,7 @@ pub struct FrameConstants {
     pub fixed_exposure: f32,
     /// Share of the way to the wanted exposure that one frame goes, in the logarithm.
     pub exposure_blend: f32,
+    pub padding: u32,
 }
 
 /// Push constants of every pass.

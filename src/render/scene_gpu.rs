@@ -69,6 +69,10 @@ pub struct SceneGpu {
     pub instances: Buffer,
     pub instance_count: u32,
     pub lights: Buffer,
+    pub light_nodes: Buffer,
+    pub light_weights: Buffer,
+    /// Lights in the tree; suns follow.
+    pub finite_lights: u32,
     pub bsp_nodes: Buffer,
     pub texture_infos: Buffer,
     /// sRGB byte to linear light.
@@ -154,6 +158,8 @@ impl SceneGpu {
         let materials = buffer!("materials", &scene.materials, none);
         let instance_records = buffer!("instances", &instances, none);
         let lights = buffer!("lights", &scene.lights.lights, none);
+        let light_nodes = buffer!("light nodes", &scene.lights.tree.nodes, none);
+        let light_weights = buffer!("light weights", &scene.lights.weights, none);
         let bsp_nodes = buffer!("bsp nodes", &scene.bsp_nodes, none);
         let pvs_rows = buffer!("light rows", &scene.rows.pvs.rows, none);
         let pvs_runs = buffer!("light runs", &scene.rows.pvs.runs, none);
@@ -242,6 +248,9 @@ impl SceneGpu {
             instances: take(instance_records)?,
             instance_count,
             lights: take(lights)?,
+            light_nodes: take(light_nodes)?,
+            light_weights: take(light_weights)?,
+            finite_lights: scene.lights.tree.finite,
             bsp_nodes: take(bsp_nodes)?,
             texture_infos: take(texture_infos)?,
             srgb_table: take(srgb_table)?,
@@ -284,6 +293,9 @@ impl SceneGpu {
             materials: self.materials.address(),
             instances: self.instances.address(),
             lights: self.lights.address(),
+            light_nodes: self.light_nodes.address(),
+            light_weights: self.light_weights.address(),
+            finite_lights: self.finite_lights,
             bsp_nodes: self.bsp_nodes.address(),
             textures: self.texture_infos.address(),
             mesh_trees: self.bvh.mesh_trees.address(),

@@ -11,6 +11,20 @@ pub enum Tonemap {
     Clamp = 2,
 }
 
+/// How a random light is chosen from the receiver's row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum LightSampling {
+    /// Every light alike.
+    Uniform = 0,
+    /// In proportion to power.
+    Power = 1,
+    /// By a tree over the lights, with an eye to distance and both cosines.
+    Bvh = 2,
+    /// The tree's candidates resampled by what each would contribute.
+    Reservoir = 3,
+}
+
 /// What the estimators and the output stage are asked to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -20,6 +34,9 @@ pub struct Settings {
     pub cull_lights: u32,
     /// Lights sampled at random per hit; 0: every light of the row.
     pub random_lights: u32,
+    pub light_sampling: LightSampling,
+    /// Candidates per random light where they are resampled.
+    pub candidates: u32,
     /// Sample the lights' area; else their centre.
     pub soft_shadows: bool,
     /// Jitter inside the pixel.
@@ -45,6 +62,8 @@ impl Default for Settings {
             illumination: true,
             cull_lights: 1,
             random_lights: 1,
+            light_sampling: LightSampling::Bvh,
+            candidates: 4,
             soft_shadows: true,
             antialiasing: true,
             aperture: 0.0,

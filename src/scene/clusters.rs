@@ -1,7 +1,7 @@
 //! PVS clusters: which lights can reach which receivers.
 //!
-//! A *row* lists lights in ascending order as runs of consecutive indices (emissive triangles of one surface always come
-//! together, so runs are two to three orders of magnitude fewer than lights). Rows 0..clusters belong to the PVS clusters;
+//! A *row* lists lights in ascending order as runs of consecutive indices (lights stand in the order of a tree over space,
+//! so that those of one place come together). Rows 0..clusters belong to the PVS clusters;
 //! behind them stand the fall-back rows of surfaces whose receivers may lie in solid; the last row holds every light.
 
 use super::records::{BspNode, LightRow, LightRun};
@@ -159,9 +159,9 @@ pub struct LightLists {
 }
 
 impl LightLists {
-    fn push(&mut self, lights: impl Iterator<Item = u32>) -> u32 {
+    fn push(&mut self, lights: impl Iterator<Item = u32>, sums: &[u32]) -> u32 {
         let first_run = self.runs.len() as u32;
-        let mut light_count = 0;
+        let (mut light_count, mut weight) = (0, 0);
         for light in lights {
             match self.runs.get_mut(first_run as usize..).and_then(<[_]>::last_mut) {
                 Some(run) if run.first_light + run.count == light => run.count += 1,
@@ -169,14 +169,17 @@ impl LightLists {
                     first_light: light,
                     count: 1,
                     before: light_count,
+                    weight_before: weight,
                 }),
             }
             light_count += 1;
+            weight += sums[light as usize + 1] - sums[light as usize];
         }
         self.rows.push(LightRow {
             first_run,
             run_count: self.runs.len() as u32 - first_run,
             light_count,
+            weight,
         });
         self.rows.len() as u32 - 1
     }
@@ -206,8 +209,8 @@ pub struct LightRows {
 /// Margin by which a cluster's receivers may lie outside its leafs: the largest nudge, and rounding of leaf bounds.
 const RECEIVER_MARGIN: f32 = NUDGES[NUDGES.len() - 1] + 1.0;
 
-/// Lists lights by cluster, by fall-back set and overall.
-pub fn build_light_rows(map: &ClusterMap, reach: &[LightReach]) -> LightRows {
+/// Lists lights by cluster, by fall-back set and overall. `sums`: prefix sums of the lights' weights.
+pub fn build_light_rows(map: &ClusterMap, reach: &[LightReach], sums: &[u32]) -> LightRows {
     // Lights of one surface share their clusters: each distinct set is tested once per row.
     let mut sets: HashMap<&ClusterSet, u32> = HashMap::new();
     let mut distinct: Vec<&ClusterSet> = Vec::new();
@@ -245,8 +248,8 @@ pub fn build_light_rows(map: &ClusterMap, reach: &[LightReach]) -> LightRows {
         .collect();
     let mut rows = LightRows::default();
     for (pvs, tight) in cluster_lights {
-        rows.pvs.push(pvs.into_iter());
-        rows.tight.push(tight.into_iter());
+        rows.pvs.push(pvs.into_iter(), sums);
+        rows.tight.push(tight.into_iter(), sums);
     }
     // Fall-back rows: the union over a surface's own leafs, shared between surfaces with the same leafs.
     let mut fallback: HashMap<&ClusterSet, u32> = HashMap::new();
@@ -261,14 +264,14 @@ pub fn build_light_rows(map: &ClusterMap, reach: &[LightReach]) -> LightRows {
                     visible.unite(map.visible_from(c));
                 }
                 let lights = lights_seen(&visible);
-                rows.tight.push(lights.iter().copied());
-                rows.pvs.push(lights.into_iter())
+                rows.tight.push(lights.iter().copied(), sums);
+                rows.pvs.push(lights.into_iter(), sums)
             })
         };
         pending.push(row);
     }
-    rows.tight.push(0..reach.len() as u32);
-    rows.all_row = rows.pvs.push(0..reach.len() as u32);
+    rows.tight.push(0..reach.len() as u32, sums);
+    rows.all_row = rows.pvs.push(0..reach.len() as u32, sums);
     rows.surface_row = pending
         .into_iter()
         .map(|row| if row == u32::MAX { rows.all_row } else { row })

@@ -1,6 +1,8 @@
 //! The lights that a map's files describe: emissive surfaces, light entities, suns and skies, in luxel units.
 
-use super::clusters::{ClusterMap, LightReach};
+use super::clusters::{ClusterMap, ClusterSet, LightReach};
+use super::light_power::weight_sums;
+use super::light_tree::LightTree;
 use super::material::{MaterialSource, Visibility};
 use super::records::{
     LIGHT_DOME, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, LIGHT_TWO_SIDED,
@@ -43,6 +45,10 @@ pub struct LightTable {
     pub lights: Vec<Light>,
     pub sources: Vec<LightSource>,
     pub reach: Vec<LightReach>,
+    /// Tree over the lights, whose order the lights are in.
+    pub tree: LightTree,
+    /// Prefix sums of the lights' weights by power; one more than there are lights.
+    pub weights: Vec<u32>,
 }
 
 const BLANK: Light = Light {
@@ -84,7 +90,7 @@ impl LightTable {
         self.sources.iter().filter(|s| **s == source).count()
     }
 
-    /// Collects the lights in a fixed order: surfaces as they stand in the file, entities, suns, domes.
+    /// Collects the lights: surfaces, entities, suns and domes, in the order of the tree over them.
     pub fn collect(inputs: &LightInputs) -> Self {
         let mut table = Self::default();
         for (index, mesh) in inputs.geometry.meshes.iter().enumerate() {
@@ -100,7 +106,18 @@ impl LightTable {
             table.add_entity(inputs, entity);
         }
         table.add_skies(inputs);
+        table.put_in_order();
         table
+    }
+
+    /// Builds the tree and the weights, and brings the lights into the tree's order.
+    fn put_in_order(&mut self) {
+        let (tree, order) = LightTree::build(&self.lights);
+        self.lights = order.iter().map(|&i| self.lights[i as usize]).collect();
+        self.sources = order.iter().map(|&i| self.sources[i as usize]).collect();
+        self.reach = order.iter().map(|&i| self.reach[i as usize].clone()).collect();
+        self.weights = weight_sums(&self.lights);
+        self.tree = tree;
     }
 
     fn add_triangles(&mut self, inputs: &LightInputs, range: std::ops::Range<u32>, placement: Affine3A, moves: bool) {
@@ -126,17 +143,7 @@ impl LightTable {
             let sky = source.visibility == Visibility::Sky;
             let two_sided = material.flags & MATERIAL_TWO_SIDED_EMISSION != 0 && !sky;
             let normal = cross / (2.0 * area);
-            let clusters = if moves {
-                let mut bounds = Bounds::EMPTY;
-                [a, b, c].into_iter().for_each(|p| bounds.include(p));
-                inputs.clusters.in_box(inputs.bsp, bounds.grown(1.0))
-            } else {
-                // Leafs do not list every surface that lies in them (slimefac's teleporters are listed far from where
-                // they stand), and list some for their neighbours' sake: both count.
-                let mut set = inputs.clusters.at_triangle(inputs.bsp, [a, b, c]);
-                set.unite(&inputs.clusters.of_surface[triangle.surface as usize]);
-                set
-            };
+            let clusters = clusters_of_triangle(inputs, [a, b, c], triangle.surface, moves);
             let clusters = Some(clusters).filter(|set| !set.is_empty());
             self.push(
                 if sky {
@@ -247,7 +254,7 @@ impl LightTable {
                 radius: entity.number("_deviance").unwrap_or(0.0).to_radians(),
                 irradiance: colour * (photons / 255.0 / samples),
             };
-            self.add_sun(&sun);
+            self.add_sun(&sun, sky_openings(inputs).as_ref());
             return;
         }
         let spot = target.map(|t| t.origin() - origin).filter(|d| *d != Vec3::ZERO);
@@ -272,7 +279,8 @@ impl LightTable {
         });
     }
 
-    fn add_sun(&mut self, sun: &SunLight) {
+    /// `openings`: clusters of all sky surfaces, through which alone a sun shines.
+    fn add_sun(&mut self, sun: &SunLight, openings: Option<&ClusterSet>) {
         let d = sun.direction;
         self.push(
             LightSource::Sun,
@@ -284,7 +292,7 @@ impl LightTable {
                 ..BLANK
             },
             LightReach {
-                clusters: None,
+                clusters: openings.cloned(),
                 front: None,
             },
         );
@@ -300,6 +308,7 @@ impl LightTable {
         let no_shader_sun = worldspawn
             .and_then(|w| w.number("_noshadersun"))
             .is_some_and(|n| n != 0.0);
+        let openings = sky_openings(inputs);
         let mut suns: Vec<Sun> = Vec::new();
         for (source, _) in inputs.sources.iter().zip(&used).filter(|(_, used)| **used) {
             for sun in source.suns.iter().filter(|_| !no_shader_sun) {
@@ -308,28 +317,90 @@ impl LightTable {
                     continue;
                 }
                 suns.push(*sun);
-                self.add_sun(&SunLight {
+                let light = SunLight {
                     direction: sun.direction(),
                     radius: sun.deviance_degrees.to_radians(),
                     irradiance: sun.color.normalize_or_zero() * (sun.intensity / 255.0),
-                });
+                };
+                self.add_sun(&light, openings.as_ref());
             }
             if let Some(value) = source.sky_light {
-                self.push(
-                    LightSource::SkyDome,
-                    Light {
-                        kind: LIGHT_DOME,
-                        radiance: (source.emission_colour() * (value / 255.0)).into(),
-                        ..BLANK
-                    },
-                    LightReach {
-                        clusters: None,
-                        front: None,
-                    },
-                );
+                let radiance = source.emission_colour() * (value / 255.0);
+                for_sky_triangles(inputs, |corners, surface, moves| {
+                    self.add_dome(inputs, radiance, corners, surface, moves);
+                });
             }
         }
     }
+
+    /// The part of a dome that is seen through a sky triangle, whose sides are both windows.
+    fn add_dome(&mut self, inputs: &LightInputs, radiance: Vec3, [a, b, c]: [Vec3; 3], surface: u32, moves: bool) {
+        let area = (b - a).cross(c - a).length() * 0.5;
+        if !(area > 0.0 && area.is_finite()) {
+            return;
+        }
+        let clusters = clusters_of_triangle(inputs, [a, b, c], surface, moves);
+        self.push(
+            LightSource::SkyDome,
+            Light {
+                kind: LIGHT_DOME,
+                flags: LIGHT_TWO_SIDED,
+                p0: a.into(),
+                size: area,
+                p1: (b - a).into(),
+                p2: (c - a).into(),
+                radiance: radiance.into(),
+                ..BLANK
+            },
+            LightReach {
+                clusters: Some(clusters).filter(|set| !set.is_empty()),
+                front: None,
+            },
+        );
+    }
+}
+
+/// Clusters that a placed triangle touches; of a mover, those around it.
+fn clusters_of_triangle(inputs: &LightInputs, corners: [Vec3; 3], surface: u32, moves: bool) -> ClusterSet {
+    if moves {
+        let mut bounds = Bounds::EMPTY;
+        corners.into_iter().for_each(|p| bounds.include(p));
+        return inputs.clusters.in_box(inputs.bsp, bounds.grown(1.0));
+    }
+    // Leafs do not list every surface that lies in them (slimefac's teleporters are listed far from where they stand),
+    // and list some for their neighbours' sake: both count.
+    let mut set = inputs.clusters.at_triangle(inputs.bsp, corners);
+    set.unite(&inputs.clusters.of_surface[surface as usize]);
+    set
+}
+
+/// Calls with the corners, surface and whether it may move of every traced triangle of a sky.
+fn for_sky_triangles(inputs: &LightInputs, mut found: impl FnMut([Vec3; 3], u32, bool)) {
+    for (index, mesh) in inputs.geometry.meshes.iter().enumerate() {
+        let Some(placement) = inputs.placements[index] else {
+            continue;
+        };
+        for t in mesh.first_triangle..mesh.first_triangle + mesh.triangle_count {
+            let triangle = inputs.geometry.triangles[t as usize];
+            if inputs.sources[triangle.material as usize].visibility == Visibility::Sky {
+                let corners = inputs.geometry.corners(t).map(|p| placement.transform_point3(p));
+                found(corners, triangle.surface, index != 0);
+            }
+        }
+    }
+}
+
+/// Clusters of all sky surfaces; `None` where some sky surface lies in no cluster.
+fn sky_openings(inputs: &LightInputs) -> Option<ClusterSet> {
+    let mut all = Some(ClusterSet::new(inputs.clusters.count));
+    for_sky_triangles(inputs, |corners, surface, moves| {
+        let set = clusters_of_triangle(inputs, corners, surface, moves);
+        match &mut all {
+            Some(all) if !set.is_empty() => all.unite(&set),
+            _ => all = None,
+        }
+    });
+    all
 }
 
 struct SunLight {

@@ -148,7 +148,7 @@ impl Scene {
             materials: &materials,
             clusters: &clusters,
         });
-        let rows = build_light_rows(&clusters, &lights.reach);
+        let rows = build_light_rows(&clusters, &lights.reach, &lights.weights);
         for t in &mut geometry.triangles {
             t.fallback_row = rows.surface_row[t.surface as usize];
         }

@@ -5,6 +5,8 @@ pub mod camera;
 pub mod clusters;
 pub mod emission;
 pub mod entity_geometry;
+pub mod light_power;
+pub mod light_tree;
 pub mod lights;
 pub mod load;
 pub mod material;

@@ -82,7 +82,7 @@ pub const LIGHT_TRIANGLE: u32 = 0;
 pub const LIGHT_SPHERE: u32 = 1;
 /// `Light::kind`: a sun of a given angular radius, seen through sky surfaces.
 pub const LIGHT_SUN: u32 = 2;
-/// `Light::kind`: the compiler's sky dome (`q3map_skylight`), seen through sky surfaces.
+/// `Light::kind`: the compiler's sky dome (`q3map_skylight`) seen through a triangle of a sky surface.
 pub const LIGHT_DOME: u32 = 3;
 
 /// `Light::flags`: a triangle that emits on both sides.
@@ -101,7 +101,7 @@ pub const LIGHT_NO_COSINE: u32 = 8;
 /// | triangle | first vertex | edge to the second | edge to the third | as `Material::emission` |
 /// | sphere | centre | unit axis of the spot | (cone radius at distance 1, fade, photons/255) | radiance of the sphere's surface |
 /// | sun | unit direction to the sun | (azimuth, elevation, angular radius) in radians | 0 | irradiance/π at normal incidence |
-/// | dome | 0 | 0 | 0 | V/255 × colour |
+/// | dome | first vertex | edge to the second | edge to the third | V/255 × colour |
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Light {
@@ -111,7 +111,7 @@ pub struct Light {
     pub triangle: u32,
     pub material: u32,
     pub p0: [f32; 3],
-    /// Area in square units (triangle), radius in units (sphere), else 0.
+    /// Area in square units (triangle, dome), radius in units (sphere), else 0.
     pub size: f32,
     pub p1: [f32; 3],
     pub instance: u32,
@@ -139,6 +139,8 @@ pub struct LightRow {
     pub run_count: u32,
     /// Lights in all runs of the row.
     pub light_count: u32,
+    /// Weight of all lights of the row.
+    pub weight: u32,
 }
 
 /// A run of consecutive lights in a row.
@@ -149,6 +151,31 @@ pub struct LightRun {
     pub count: u32,
     /// Lights in the row's earlier runs.
     pub before: u32,
+    /// Weight of the lights in the row's earlier runs.
+    pub weight_before: u32,
+}
+
+/// A node of the tree over lights; its left child stands right behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightNode {
+    /// Middle of the box around the node's lights.
+    pub centre: [f32; 3],
+    /// Cosine of the half angle of the cone that holds the normals of its emitters; −1 where some light emits in all
+    /// directions.
+    pub cos_cone: f32,
+    /// Half the box's size.
+    pub half_size: [f32; 3],
+    /// Where all emitters face one way: the least coordinate along the cone's axis of any of them, at or below which no
+    /// receiver gets light from the node; else −∞.
+    pub front: f32,
+    /// Axis of the cone.
+    pub axis: [f32; 3],
+    /// Its lights.
+    pub first: u32,
+    pub count: u32,
+    /// The right child; 0 in a leaf, which holds one light.
+    pub right: u32,
 }
 
 /// Size of a texture in pixels, and its number of mip levels.

@@ -25,6 +25,12 @@ pub const DIM_LIGHT_PICK: u32 = 16;
 pub const DIM_LIGHT_POINT: u32 = 80;
 /// Most lights chosen at random per receiver.
 pub const MAX_RANDOM_LIGHTS: u32 = 64;
+/// Choice of the c-th candidate for the i-th random light (at place 32·i + c), and which candidate is kept.
+pub const DIM_CANDIDATE_PICK: u32 = 0x1000;
+/// Position on that candidate.
+pub const DIM_CANDIDATE_POINT: u32 = 0x2000;
+/// Most candidates per random light.
+pub const MAX_CANDIDATES: u32 = 32;
 /// Position on light number i when all lights are sampled; everything from here up belongs to it.
 pub const DIM_EVERY_LIGHT: u32 = 0x1_0000;
 
@@ -72,20 +78,25 @@ pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Two numbers in [0, 1) of sample `index` under a [`key`].
-pub fn sample2(sequence: Sequence, key: u32, index: u32) -> [f32; 2] {
+/// Two numbers of 32 random bits of sample `index` under a [`key`].
+pub fn bits2(sequence: Sequence, key: u32, index: u32) -> [u32; 2] {
     match sequence {
         Sequence::Random => {
             let a = pcg(key ^ pcg(index));
-            [unit(a), unit(pcg(a ^ key.rotate_left(16)))]
+            [a, pcg(a ^ key.rotate_left(16))]
         }
         Sequence::Sobol => {
             let shuffled = owen(index, key);
             let x = owen(shuffled.reverse_bits(), pcg(key ^ 0x68bc_21eb));
             let y = owen(sobol1(shuffled), pcg(key ^ 0x02e5_be93));
-            [unit(x), unit(y)]
+            [x, y]
         }
     }
+}
+
+/// Two numbers in [0, 1) of sample `index` under a [`key`].
+pub fn sample2(sequence: Sequence, key: u32, index: u32) -> [f32; 2] {
+    bits2(sequence, key, index).map(unit)
 }
 
 /// Uniform point in the unit disc from two numbers (concentric map of Shirley and Chiu 1997).
@@ -126,6 +137,8 @@ mod tests {
             DIM_SHUTTER..DIM_SHUTTER + 1,
             DIM_LIGHT_PICK..DIM_LIGHT_PICK + MAX_RANDOM_LIGHTS,
             DIM_LIGHT_POINT..DIM_LIGHT_POINT + MAX_RANDOM_LIGHTS,
+            DIM_CANDIDATE_PICK..DIM_CANDIDATE_PICK + MAX_RANDOM_LIGHTS * MAX_CANDIDATES,
+            DIM_CANDIDATE_POINT..DIM_CANDIDATE_POINT + MAX_RANDOM_LIGHTS * MAX_CANDIDATES,
             DIM_EVERY_LIGHT..u32::MAX,
         ];
         for pair in ranges.windows(2) {

@@ -78,6 +78,29 @@ pub fn sunlit(sun: (f64, f64, f64, f64)) -> Fixture {
     })
 }
 
+/// A box whose walls and ceiling are sky with a white dome of value V.
+pub fn under_dome(value: u32) -> Fixture {
+    let script = format!(
+        "textures/fixture/sky\n{{\n\tsurfaceparm sky\n\tq3map_lightRGB 1 1 1\n\tq3map_skylight {value} 5\n\tskyparms - \
+         512 -\n}}\n"
+    );
+    boxed("under_dome", &script, |map, walls| {
+        let shader = map.shader(
+            "textures/fixture/sky",
+            surface_flags::SKY | surface_flags::NOLIGHTMAP,
+            0,
+        );
+        let sky = Paint {
+            shader,
+            mapping: Mapping::Fit,
+        };
+        // The floor stays.
+        for wall in [0, 1, 2, 3, 5] {
+            walls[wall] = Some(sky);
+        }
+    })
+}
+
 /// A box with an upright emitter of 16 x 8 units, a quarter unit above the floor, facing +x at x = 128.
 pub fn emitter_on_floor(surfacelight: u32) -> Fixture {
     let script = format!(

@@ -4,12 +4,13 @@
 use glam::Vec3;
 use q3rays::reference::CpuRenderer;
 use q3rays::reference::direct::{RayCounts, SampleAddress, direct_light, light_row};
+use q3rays::reference::light_choice::choose;
 use q3rays::reference::light_sample::{Target, sample_light};
 use q3rays::reference::surface::{SurfaceHit, classify, emission_seen, offset_point, surface_at};
 use q3rays::render::settings::Settings;
 use q3rays::scene::camera::Camera;
 use q3rays::scene::records::NONE;
-use q3rays::scene::sampling::{DIM_LIGHT_PICK, DIM_LIGHT_POINT, key, sample2};
+use q3rays::scene::sampling::{DIM_LIGHT_PICK, DIM_LIGHT_POINT, bits2, key, sample2};
 use std::collections::BTreeMap;
 
 /// What a sample that differs was.
@@ -26,6 +27,10 @@ pub enum Class {
     /// The same surface, and a shadow ray that ends beside the light's sample is blocked otherwise: the light touches
     /// what blocks it.
     LightContact,
+    /// A random number beside the one that chose a light chooses another.
+    LightChoice,
+    /// A point beside the light's sample emits otherwise: the edge of a texel of a lamp's or lava's picture.
+    LightTexel,
     /// None of these: a bug.
     Unexplained,
 }
@@ -51,6 +56,9 @@ pub struct Context<'a> {
 const RECEIVER: f32 = 4e-6;
 /// How far it may turn a ray, radians.
 const RAY: f32 = 2e-6;
+
+/// How far it may move a point on a light, as a share of the light.
+const LIGHT_POINT: f32 = 5e-5;
 
 fn around() -> impl Iterator<Item = Vec3> {
     (0..27).map(|i| Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32) - 1.0)
@@ -117,25 +125,45 @@ impl Context<'_> {
         }
         Some(if self.contact(&surface, address) {
             Class::LightContact
+        } else if self.choice_tie(&surface, address) {
+            Class::LightChoice
+        } else if self.texel(&surface, address, seen.radiance / own) {
+            Class::LightTexel
         } else {
             Class::Unexplained
+        })
+    }
+
+    /// The i-th light that is chosen for a receiver, with the number that chooses moved by as many steps of a float.
+    fn chosen(&self, at: &SurfaceHit, address: SampleAddress, i: u32, steps: i32) -> Option<u32> {
+        let (scene, settings) = (self.cpu.scene, &self.settings);
+        let (lists, row) = light_row(scene, settings, at.row);
+        let k = key(settings.seed, address.pixel, DIM_LIGHT_PICK + i);
+        let [bits, _] = bits2(settings.sequence, k, address.index);
+        let bits = bits.saturating_add_signed(steps << 8);
+        choose(settings.light_sampling, &scene.lights, lists, row, at, bits).map(|c| c.light)
+    }
+
+    fn choice_tie(&self, at: &SurfaceHit, address: SampleAddress) -> bool {
+        (0..self.settings.random_lights).any(|i| {
+            let chosen = |steps| self.chosen(at, address, i, steps);
+            (-8..=8).any(|steps| chosen(steps) != chosen(0))
         })
     }
 
     /// Whether moving the end of one of the random lights' shadow rays changes what it meets.
     fn contact(&self, at: &SurfaceHit, address: SampleAddress) -> bool {
         let (scene, settings) = (self.cpu.scene, &self.settings);
-        let (lists, row) = light_row(scene, settings, at.row);
-        let lights: Vec<u32> = lists.lights(row).collect();
         let numbers = |dimension| {
             let k = key(settings.seed, address.pixel, dimension);
             sample2(settings.sequence, k, address.index)
         };
         let origin = offset_point(at.position, at.geometric_normal);
         (0..settings.random_lights).any(|i| {
-            let [u, _] = numbers(DIM_LIGHT_PICK + i);
-            let pick = ((u * lights.len() as f32) as usize).min(lights.len() - 1);
-            let light = &scene.lights.lights[lights[pick] as usize];
+            let Some(light) = self.chosen(at, address, i, 0) else {
+                return false;
+            };
+            let light = &scene.lights.lights[light as usize];
             let sample = sample_light(scene, light, at, numbers(DIM_LIGHT_POINT + i), settings.soft_shadows);
             let Some(Target::Point(end)) = sample.map(|s| s.target) else {
                 return false;
@@ -143,6 +171,35 @@ impl Context<'_> {
             let blocked = |end: Vec3| self.cpu.tracer.occluded(scene, origin, end - origin, 1.0);
             let step = RECEIVER * end.abs().max_element().max(256.0);
             around().any(|offset| blocked(end + offset * step) != blocked(end))
+        })
+    }
+
+    /// Whether points on the light as near to its sample as single precision tells them apart emit in such ratios to it.
+    fn texel(&self, at: &SurfaceHit, address: SampleAddress, ratio: Vec3) -> bool {
+        let (scene, settings) = (self.cpu.scene, &self.settings);
+        (0..settings.random_lights).any(|i| {
+            let Some(light) = self.chosen(at, address, i, 0) else {
+                return false;
+            };
+            let light = &scene.lights.lights[light as usize];
+            let k = key(settings.seed, address.pixel, DIM_LIGHT_POINT + i);
+            let u = sample2(settings.sequence, k, address.index);
+            let value = |offset: Vec3| {
+                let u = [u[0] + offset.x * LIGHT_POINT, u[1] + offset.y * LIGHT_POINT].map(|u| u.clamp(0.0, 1.0));
+                sample_light(scene, light, at, u, settings.soft_shadows).map_or(Vec3::ZERO, |s| s.value)
+            };
+            let (low, high) = around()
+                .map(value)
+                .fold((Vec3::INFINITY, Vec3::ZERO), |(l, h), v| (l.min(v), h.max(v)));
+            let own = value(Vec3::ZERO);
+            (0..3).all(|c| {
+                let seen = if ratio[c].is_finite() {
+                    ratio[c] * own[c]
+                } else {
+                    own[c]
+                };
+                seen >= low[c] * 0.9998 && seen <= high[c] * 1.0002
+            })
         })
     }
 

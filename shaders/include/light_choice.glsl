@@ -1,0 +1,247 @@
+// Which light of a receiver's row to sample, and with what probability. Counterpart of src/reference/light_choice.rs,
+// which explains it.
+#ifndef LIGHT_CHOICE_GLSL
+#define LIGHT_CHOICE_GLSL
+
+#include "luminance.glsl"
+
+const uint SAMPLING_UNIFORM = 0;
+const uint SAMPLING_POWER = 1;
+const uint SAMPLING_BVH = 2;
+const uint SAMPLING_RESERVOIR = 3;
+
+struct Choice {
+    // NONE where nothing can be chosen.
+    uint light;
+    float probability;
+};
+
+const Choice NO_CHOICE = Choice(NONE, 0.0);
+
+// 32 random bits → 0..n.
+uint scaled(uint bits, uint n) {
+    uint high;
+    uint low;
+    umulExtended(bits, n, high, low);
+    return high;
+}
+
+Choice choose_uniform(LightRow row, uint bits) {
+    uint k = scaled(bits, row.light_count);
+    uint lo = 0;
+    uint hi = row.run_count;
+    [[dont_unroll]] while (hi - lo > 1) {
+        uint mid = (lo + hi) >> 1;
+        if (FC.light_runs.at[row.first_run + mid].before <= k) lo = mid; else hi = mid;
+    }
+    LightRun run = FC.light_runs.at[row.first_run + lo];
+    return Choice(run.first_light + (k - run.before), 1.0 / float(row.light_count));
+}
+
+Choice choose_power(LightRow row, uint bits) {
+    uint x = scaled(bits, row.weight);
+    uint lo = 0;
+    uint hi = row.run_count;
+    [[dont_unroll]] while (hi - lo > 1) {
+        uint mid = (lo + hi) >> 1;
+        if (FC.light_runs.at[row.first_run + mid].weight_before <= x) lo = mid; else hi = mid;
+    }
+    LightRun run = FC.light_runs.at[row.first_run + lo];
+    x = x - run.weight_before + FC.light_weights.at[run.first_light];
+    lo = run.first_light;
+    hi = run.first_light + run.count;
+    [[dont_unroll]] while (hi - lo > 1) {
+        uint mid = (lo + hi) >> 1;
+        if (FC.light_weights.at[mid] <= x) lo = mid; else hi = mid;
+    }
+    uint weight = FC.light_weights.at[lo + 1] - FC.light_weights.at[lo];
+    return Choice(lo, float(weight) / float(row.weight));
+}
+
+// Cosine of an angle that has been made smaller by another, down to 0. The other is between 0 and π.
+float widened(float cos_angle, float sin_by, float cos_by) {
+    return cos_angle >= cos_by ? 1.0 : cos_angle * cos_by + sqrt(max(1.0 - cos_angle * cos_angle, 0.0)) * sin_by;
+}
+
+// Estimated irradiance/π that a node's lights give per strength. 0 only where the node cannot light the receiver.
+float importance(LightNode node, SurfaceHit at) {
+    vec3 to = node.centre - at.position;
+    float highest = dot(at.shading_normal, to) + dot(abs(at.shading_normal), node.half_size);
+    if (highest <= 0.0 || dot(node.axis, at.position) <= node.front) return 0.0;
+    float d2 = dot(to, to);
+    float r2 = dot(node.half_size, node.half_size);
+    vec3 gap = max(abs(to) - node.half_size, vec3(0.0));
+    float distance = max(0.5 * (d2 + dot(gap, gap)), 0.5 * r2);
+    if (d2 <= r2) return 1.0 / distance;
+    vec3 direction = to / sqrt(d2);
+    float sin_sphere = sqrt(r2 / d2);
+    float cos_sphere = sqrt(max(1.0 - r2 / d2, 0.0));
+    float receiver = widened(dot(at.shading_normal, direction), sin_sphere, cos_sphere);
+    if (receiver <= 0.0) return 0.0;
+    if (node.cos_cone <= -1.0) return receiver / distance;
+    float sin_cone = sqrt(max(1.0 - node.cos_cone * node.cos_cone, 0.0));
+    float s = sin_cone * cos_sphere + node.cos_cone * sin_sphere;
+    float c = node.cos_cone * cos_sphere - sin_cone * sin_sphere;
+    float emitter = s <= 0.0 ? 1.0 : widened(-dot(node.axis, direction), s, c);
+    return receiver * max(emitter, 0.0) / distance;
+}
+
+float sun_strength(Light light) {
+    return max(luminance(light.radiance), 0.0);
+}
+
+float sun_importance(Light light, SurfaceHit at) {
+    float cosine = widened(dot(at.shading_normal, light.p0), sin(light.p1.z), cos(light.p1.z));
+    return max(cosine, 0.0) * sun_strength(light);
+}
+
+// The part of a row's runs that lies in a node: runs from..to, and the weight of the row's lights before the node and
+// before its end.
+struct Part {
+    uint from;
+    uint to;
+    uint before;
+    uint after;
+};
+
+// The parts in front of light `middle` and from it on.
+void split_part(Part part, uint first_run, uint middle, out Part left, out Part right) {
+    left = part;
+    right = part;
+    uint lo = part.from;
+    uint hi = part.to;
+    [[dont_unroll]] while (lo < hi) {
+        uint mid = (lo + hi) >> 1;
+        if (FC.light_runs.at[first_run + mid].first_light < middle) lo = mid + 1; else hi = mid;
+    }
+    left.to = lo;
+    if (lo == part.from) {
+        left.after = part.before;
+        return;
+    }
+    LightRun run = FC.light_runs.at[first_run + lo - 1];
+    uint end = run.first_light + run.count;
+    uint weight = run.weight_before + FC.light_weights.at[min(middle, end)] - FC.light_weights.at[run.first_light];
+    weight = clamp(weight, part.before, part.after);
+    left.after = weight;
+    right.from = end > middle ? lo - 1 : lo;
+    right.before = weight;
+}
+
+// A random number that choices are made with, one after the other. Bits that choices have used up are replaced.
+struct Chooser {
+    float u;
+    float grain;
+    uint bits;
+};
+
+const float FINE = 1.0 / 16777216.0;
+const float COARSE = 1.0 / 4096.0;
+
+// True with probability p, 0 < p < 1.
+bool take(inout Chooser chooser, float p) {
+    bool taken = chooser.u < p;
+    float share = taken ? p : 1.0 - p;
+    chooser.u = taken ? chooser.u / p : (chooser.u - p) / (1.0 - p);
+    chooser.grain /= share;
+    if (chooser.grain > COARSE) {
+        chooser.bits = pcg(chooser.bits);
+        chooser.u += chooser.grain * unit_float(chooser.bits);
+        chooser.grain = FINE;
+    }
+    chooser.u = clamp(chooser.u, 0.0, 1.0 - FINE);
+    return taken;
+}
+
+const float SUN_SHARE = 0.5;
+const float LEAST_SUN_SHARE = 1.0 / 1024.0;
+
+// Sums of the suns' importances, and of what these would be if each stood overhead; where `wanted` >= 0, also the sun at
+// which the first sum passes it.
+vec2 walk_suns(uint first_run, Part suns, SurfaceHit at, float wanted, out Choice chosen) {
+    chosen = NO_CHOICE;
+    vec2 sum = vec2(0.0);
+    [[dont_unroll]] for (uint r = suns.from; r < suns.to; r++) {
+        LightRun run = FC.light_runs.at[first_run + r];
+        [[dont_unroll]] for (uint i = max(run.first_light, FC.finite_lights); i < run.first_light + run.count; i++) {
+            Light sun = FC.lights.at[i];
+            float one = sun_importance(sun, at);
+            sum += vec2(one, sun_strength(sun));
+            if (wanted >= 0.0 && one > 0.0) {
+                chosen = Choice(i, one);
+                if (wanted < sum.x) return sum;
+            }
+        }
+    }
+    return sum;
+}
+
+float weigh(LightNode node, Part part, SurfaceHit at) {
+    return part.after == part.before ? 0.0 : float(part.after - part.before) * importance(node, at);
+}
+
+Choice descend(uint first_run, Part part, SurfaceHit at, float probability, inout Chooser chooser) {
+    uint here = 0;
+    LightNode node = FC.light_nodes.at[0];
+    [[dont_unroll]] while (node.right != 0) {
+        LightNode l = FC.light_nodes.at[here + 1];
+        LightNode r = FC.light_nodes.at[node.right];
+        Part left;
+        Part right;
+        split_part(part, first_run, r.first, left, right);
+        float wl = weigh(l, left, at);
+        float wr = weigh(r, right, at);
+        if (wl <= 0.0 && wr <= 0.0) return NO_CHOICE;
+        bool take_left;
+        if (wr <= 0.0) {
+            take_left = true;
+        } else if (wl <= 0.0) {
+            take_left = false;
+        } else {
+            float p = clamp(wl / (wl + wr), FINE, 1.0 - FINE);
+            take_left = take(chooser, p);
+            probability *= take_left ? p : 1.0 - p;
+        }
+        here = take_left ? here + 1 : node.right;
+        if (take_left) {
+            node = l;
+            part = left;
+        } else {
+            node = r;
+            part = right;
+        }
+    }
+    return Choice(node.first, probability);
+}
+
+Choice choose_by_tree(LightRow row, SurfaceHit at, uint bits) {
+    Part finite;
+    Part suns;
+    split_part(Part(0, row.run_count, 0, row.weight), row.first_run, FC.finite_lights, finite, suns);
+    Chooser chooser = Chooser(unit_float(bits), FINE, bits);
+    Choice choice;
+    vec2 sums = walk_suns(row.first_run, suns, at, -1.0, choice);
+    float total_sun = sums.x;
+    float sun_share = max(SUN_SHARE * total_sun / max(sums.y, 1.17549435e-38), LEAST_SUN_SHARE);
+    float root = finite.after != finite.before ? importance(FC.light_nodes.at[0], at) : 0.0;
+    float probability = 1.0;
+    if (total_sun > 0.0 && (root <= 0.0 || take(chooser, sun_share))) {
+        if (root > 0.0) probability = sun_share;
+        walk_suns(row.first_run, suns, at, chooser.u * total_sun, choice);
+        choice.probability = probability * (choice.probability / total_sun);
+        return choice;
+    }
+    if (root <= 0.0) return NO_CHOICE;
+    if (total_sun > 0.0) probability = 1.0 - sun_share;
+    return descend(row.first_run, finite, at, probability, chooser);
+}
+
+// Chooses from a row with 32 random bits.
+Choice choose_light(uint sampling, LightRow row, SurfaceHit at, uint bits) {
+    if (row.light_count == 0) return NO_CHOICE;
+    if (sampling == SAMPLING_UNIFORM) return choose_uniform(row, bits);
+    if (sampling == SAMPLING_POWER) return choose_power(row, bits);
+    return choose_by_tree(row, at, bits);
+}
+
+#endif
