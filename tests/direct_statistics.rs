@@ -140,13 +140,10 @@ fn random_lights_have_the_mean_of_all() {
         for (sampling, lights, cull) in [
             (LightSampling::Uniform, 1, 0),
             (LightSampling::Uniform, 4, 1),
-            (LightSampling::Power, 1, 1),
             (LightSampling::Power, 2, 2),
             (LightSampling::Bvh, 1, 0),
-            (LightSampling::Bvh, 1, 1),
-            (LightSampling::Bvh, 2, 2),
+            (LightSampling::Bvh, 2, 1),
             (LightSampling::Reservoir, 1, 1),
-            (LightSampling::Reservoir, 2, 0),
         ] {
             let name = format!("{what}, {lights} lights, {sampling:?}, rt_cullLights {cull}");
             let film: Accumulate = &|seed, samples| film(sampling, lights, cull, seed, samples);
