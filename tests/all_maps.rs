@@ -6,7 +6,7 @@
 use q3rays::assets::vfs::{Install, Vfs};
 use q3rays::content::embedded::EMBEDDED;
 use q3rays::reference::CpuRenderer;
-use q3rays::render::settings::Settings;
+use q3rays::render::settings::{LightSampling, Settings};
 use q3rays::scene::lights::LightSource;
 use q3rays::scene::report::Report;
 use q3rays::scene::spawns::{overview, view};
@@ -35,6 +35,7 @@ fn every_map_renders_at_every_spawn() {
     );
     let settings = Settings {
         random_lights: LIGHTS,
+        light_sampling: LightSampling::Bvh,
         ..Settings::default()
     };
     let mut table = String::from(
@@ -106,7 +107,7 @@ fn every_map_renders_at_every_spawn() {
     if std::env::var_os("Q3RAYS_UPDATE_DOCS").is_some() {
         let head = format!(
             "# Every map\n\nMade by `Q3RAYS_UPDATE_DOCS=1 cargo test --release --test all_maps -- --ignored`: all maps found, each \
-             rendered at every spawn point at {}x{} on the CPU tracer with {LIGHTS} random lights and {SAMPLES} samples a pixel. \
+             rendered at every spawn point at {}x{} on the CPU tracer with {LIGHTS} random lights (`rt_lightSampling bvh`) and {SAMPLES} samples a pixel. \
              *Black* is the share of pixels without any radiance (noise included), *mean* the mean radiance in luxel units, \
              *in cluster at 0.25*, *by leafs* and *all lights* say how receivers find their light list \
              ([architecture](architecture.md)). Load time is for two cores, script and image decoding included.\n\n",

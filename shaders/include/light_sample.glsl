@@ -41,40 +41,40 @@ struct SphericalSample {
     float solid_angle;
 };
 
-SphericalSample spherical_triangle(vec3 a, vec3 b, vec3 c, float volume, vec2 u) {
-    float length_a = length(a);
-    float length_b = length(b);
-    float length_c = length(c);
-    a /= length_a;
-    b /= length_b;
-    c /= length_c;
+SphericalSample spherical_triangle(vec3 pa, vec3 pb, vec3 pc, float volume, vec2 u) {
+    vec3 a = pa / length(pa);
+    vec3 b = pb / length(pb);
+    vec3 c = pc / length(pc);
     float ab = dot(a, b);
     float bc = dot(b, c);
     float ca = dot(c, a);
-    float triple = abs(volume) / (length_a * length_b * length_c);
+    float triple = abs(volume) / (length(pa) * length(pb) * length(pc));
     float solid_angle = 2.0 * precise_angle(triple, 1.0 + ab + bc + ca);
     // The longest edge is put opposite to a, whose own edges are then far from half a turn.
     if (ca < bc && ca < ab) {
-        vec3 first = a;
+        vec3 first = pa;
+        pa = pb;
+        pb = pc;
+        pc = first;
         a = b;
         b = c;
-        c = first;
-        float first_ab = ab;
         ab = bc;
-        ca = first_ab;
     } else if (ab < bc) {
-        vec3 first = a;
+        vec3 first = pa;
+        pa = pc;
+        pc = pb;
+        pb = first;
+        b = a;
         a = c;
-        c = b;
-        b = first;
         ab = ca;
-        ca = bc;
     }
-    vec3 tb = b - a * ab;
-    vec3 tc = c - a * ca;
-    float lb = length(tb);
-    float lc = length(tc);
-    float cos_alpha = clamp(dot(tb, tc) / (lb * lc), -1.0, 1.0);
+    vec3 nb = cross(pa, pb - pa);
+    vec3 nc = cross(pa, pc - pa);
+    float length_b = length(nb);
+    float length_c = length(nc);
+    float lb = length_b / (length(pa) * length(pb));
+    float lc = length_c / (length(pa) * length(pc));
+    float cos_alpha = clamp(dot(nb, nc) / (length_b * length_c), -1.0, 1.0);
     float sin_alpha = triple / (lb * lc);
     bool usable = sin_alpha > SMALL_SINE;
     if (solid_angle <= (usable ? SMALL_SOLID_ANGLE : LARGE_SOLID_ANGLE)) {
@@ -84,7 +84,7 @@ SphericalSample spherical_triangle(vec3 a, vec3 b, vec3 c, float volume, vec2 u)
     vec2 half_area = precise_sin_cos(0.5 * solid_angle * u.x);
     float tan_ab = lb / (1.0 + ab);
     float x = half_area.x / (tan_ab * (sin_alpha * half_area.y - cos_alpha * half_area.x));
-    vec3 on_edge = (a * (1.0 - x * x) + tc * (2.0 * x / lc)) / (1.0 + x * x);
+    vec3 on_edge = (a * (1.0 - x * x) + cross(nc, a) * (2.0 * x / length_c)) / (1.0 + x * x);
     vec3 chord = on_edge - b;
     float versine = 0.5 * dot(chord, chord);
     float drop = u.y * versine;

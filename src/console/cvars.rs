@@ -140,9 +140,9 @@ pub const CVARS: &[Cvar] = &[
     ),
     choice(
         "rt_lightSampling",
-        &["bvh", "uniform", "power", "reservoir"],
-        "how a random light is chosen from the receiver's list: by a tree with an eye to distance and angle, all alike, by \
-         power, or the tree's candidates resampled by what they would contribute",
+        &["uniform", "power", "bvh", "reservoir"],
+        "how a random light is chosen from the receiver's list: all alike, by power, by a tree with an eye to distance and \
+         angle, or the tree's candidates resampled by what they would contribute",
     ),
     int(
         "rt_lightCandidates",

@@ -180,17 +180,24 @@ fn spherical_triangle(corners: [Vec3; 3], volume: f32, u: [f32; 2]) -> Spherical
     // Van Oosterom and Strackee 1983.
     let solid_angle = 2.0 * triple.atan2(1.0 + ab + bc + ca);
     // The longest edge is put opposite to a, whose own edges are then far from half a turn.
-    let (a, b, c, ab, ca) = if ca < bc && ca < ab {
-        (b, c, a, bc, ab)
+    let [pa, pb, pc] = corners;
+    let (far, a, b, ab) = if ca < bc && ca < ab {
+        ([pb, pc, pa], b, c, bc)
     } else if ab < bc {
-        (c, a, b, ca, bc)
+        ([pc, pa, pb], c, a, ca)
     } else {
-        (a, b, c, ab, ca)
+        ([pa, pb, pc], a, b, ab)
     };
-    let (tb, tc) = (b - a * ab, c - a * ca);
-    let (lb, lc) = (tb.length(), tc.length());
+    // Normals of the great circles through a and b, a and c, from the triangle's edges: differences of the unit vectors
+    // would lose the digits that small triangles need.
+    let (nb, nc) = (far[0].cross(far[1] - far[0]), far[0].cross(far[2] - far[0]));
+    let (length_b, length_c) = (nb.length(), nc.length());
+    let (lb, lc) = (
+        length_b / (far[0].length() * far[1].length()),
+        length_c / (far[0].length() * far[2].length()),
+    );
     // The angle at corner a.
-    let cos_alpha = (tb.dot(tc) / (lb * lc)).clamp(-1.0, 1.0);
+    let cos_alpha = (nb.dot(nc) / (length_b * length_c)).clamp(-1.0, 1.0);
     let sin_alpha = triple / (lb * lc);
     let usable = sin_alpha > SMALL_SINE;
     if solid_angle <= if usable { SMALL_SOLID_ANGLE } else { LARGE_SOLID_ANGLE } {
@@ -204,7 +211,7 @@ fn spherical_triangle(corners: [Vec3; 3], volume: f32, u: [f32; 2]) -> Spherical
     let (sin_half, cos_half) = (0.5 * solid_angle * u[0]).sin_cos();
     let tan_ab = lb / (1.0 + ab);
     let x = sin_half / (tan_ab * (sin_alpha * cos_half - cos_alpha * sin_half));
-    let on_edge = (a * (1.0 - x * x) + tc * (2.0 * x / lc)) / (1.0 + x * x);
+    let on_edge = (a * (1.0 - x * x) + nc.cross(a) * (2.0 * x / length_c)) / (1.0 + x * x);
     // On the arc from there to b: 1 − cosine is uniform.
     let chord = on_edge - b;
     let versine = 0.5 * chord.length_squared();

@@ -62,7 +62,7 @@ impl Default for Settings {
             illumination: true,
             cull_lights: 1,
             random_lights: 1,
-            light_sampling: LightSampling::Bvh,
+            light_sampling: LightSampling::Uniform,
             candidates: 4,
             soft_shadows: true,
             antialiasing: true,
