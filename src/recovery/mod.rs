@@ -1,0 +1,25 @@
+//! Recovery of the point lights that the map compiler stripped, from the lightmaps that it left.
+//!
+//! ```text
+//! luxels (encoding, luxels) ─► known terms (known) + gathered light (gather) ─► what they leave over (fit)
+//!     ─► candidate places (candidates) ─► greedy sparse search (solve, point) ─► lights, scales, scores
+//! ```
+//!
+//! Everything runs on the CPU, in parallel, and gives the same result for the same seed.
+
+pub mod candidates;
+pub mod encoding;
+pub mod fit;
+pub mod gather;
+pub mod known;
+pub mod lights_file;
+pub mod luxels;
+pub mod point;
+pub mod random;
+pub mod recover;
+pub mod score;
+pub mod solve;
+pub mod visibility;
+
+pub use lights_file::{LightsFile, LightsFileError};
+pub use recover::{Options, Recovery, RecoveryError, recover};

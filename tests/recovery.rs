@@ -1,0 +1,63 @@
+//! Recovery of stripped lights: encodings of the installed maps.
+mod common;
+use q3rays::recovery::encoding::Encoding;
+use q3rays::scene::Scene;
+
+#[test]
+#[ignore]
+fn encodings() {
+    let files = common::installed();
+    for map in files.maps() {
+        let scene = Scene::load(&files.focused_on(&map.name), &map.name).unwrap();
+        let e = Encoding::of(&scene.bsp, &scene.entities, &scene.lights);
+        println!("{:20} {:.3} {:.3} {:?}", map.name, e.gamma, e.compensate, e.evidence);
+    }
+}
+
+
+fn maps() -> Vec<String> {
+    match std::env::var("MAPS") {
+        Ok(list) => list.split(',').map(str::to_owned).collect(),
+        Err(_) => common::installed().maps().into_iter().map(|m| m.name).filter(|n| n != "showcase").collect(),
+    }
+}
+
+#[test]
+#[ignore]
+fn table() {
+    use q3rays::recovery::{Options, recover};
+    let files = common::installed();
+    let options = Options { hide_entities: true, hold_out_surfaces: std::env::var("HOLD").is_ok(), ..Options::default() };
+    for name in maps() {
+        let t = std::time::Instant::now();
+        let scene = Scene::load(&files.focused_on(&name), &name).unwrap();
+        let r = match recover(&scene, &options, &|_| {}) { Ok(r) => r, Err(e) => { println!("{e}"); continue; } };
+        let s = &r.scores;
+        let f = |s: q3rays::recovery::score::Score| format!("{:.3}/{:.2}", s.correlation, s.ratio);
+        println!("{:15} g {:.1} lights {:3} known {} scaled {} direct {} noind {} full {} ind {:.2} amb {:.3} sky {:.3} t {:.1}",
+            name, r.encoding.gamma, r.lights.len(), f(s.known), f(s.known_scaled), f(s.direct), f(s.without_indirect), f(s.full), r.indirect, r.ambient.y, r.sky.y, t.elapsed().as_secs_f32());
+        if std::env::var("VERBOSE").is_ok() {
+            println!("   {:?}", r.timings.iter().map(|(n, d)| format!("{n} {:.1}", d.as_secs_f32())).collect::<Vec<_>>());
+            println!("   {:?}", r.scales.iter().map(|t| format!("{} {:.2}", t.name, t.scale)).collect::<Vec<_>>());
+        }
+        truth(&scene, &r);
+    }
+}
+
+fn truth(scene: &Scene, r: &q3rays::recovery::Recovery) {
+    use q3rays::scene::lights::LightSource;
+    let truth: Vec<(glam::Vec3, f32)> = scene.lights.lights.iter().zip(&scene.lights.sources)
+        .filter(|(_, s)| matches!(s, LightSource::PointEntity | LightSource::SpotEntity))
+        .map(|(l, _)| (glam::Vec3::from(l.p0), l.p2[2] * 255.0)).collect();
+    if truth.is_empty() { return; }
+    let mut d: Vec<(f32, f32)> = truth.iter().map(|(p, n)| r.lights.iter().map(|l| (l.position.distance(*p), l.power.max_element() / n)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1e9, 0.0))).collect();
+    let within = |x: f32| d.iter().filter(|(d, _)| *d <= x).count();
+    let (w16, w32, w48, w64) = (within(16.0), within(32.0), within(48.0), within(64.0));
+    let mut ratios: Vec<f32> = d.iter().filter(|(d, _)| *d <= 48.0).map(|(_, r)| *r).collect();
+    ratios.sort_by(f32::total_cmp);
+    println!("   truth {}: found {} | within 16: {w16} 32: {w32} 48: {w48} 64: {w64} | power {:.3}", truth.len(), r.lights.len(), ratios.get(ratios.len() / 2).copied().unwrap_or(0.0));
+    if std::env::var("VERBOSE").is_ok() {
+        for ((p, n), (d, q)) in truth.iter().zip(&d) { if *d > 24.0 { println!("      missed {p} N {n} nearest {d:.0} ratio {q:.2}"); } }
+    }
+    d.sort_by(|a, b| a.0.total_cmp(&b.0));
+}
