@@ -57,7 +57,37 @@ fn truth(scene: &Scene, r: &q3rays::recovery::Recovery) {
     ratios.sort_by(f32::total_cmp);
     println!("   truth {}: found {} | within 16: {w16} 32: {w32} 48: {w48} 64: {w64} | power {:.3}", truth.len(), r.lights.len(), ratios.get(ratios.len() / 2).copied().unwrap_or(0.0));
     if std::env::var("VERBOSE").is_ok() {
+        let mut all: Vec<_> = r.lights.iter().map(|l| (l.share, truth.iter().map(|t| t.0.distance(l.position)).fold(1e9f32, f32::min), l.power.max_element())).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        println!("      {}", all.iter().map(|(s, d, p)| format!("{:.2}%:{d:.0}:{p:.0}", s * 100.0)).collect::<Vec<_>>().join(" "));
         for ((p, n), (d, q)) in truth.iter().zip(&d) { if *d > 24.0 { println!("      missed {p} N {n} nearest {d:.0} ratio {q:.2}"); } }
     }
     d.sort_by(|a, b| a.0.total_cmp(&b.0));
+}
+
+#[test]
+#[ignore]
+fn debug_known() {
+    use q3rays::recovery::{luxels, visibility::Occluders, known, score::score};
+    let files = common::installed();
+    for name in maps() {
+        let scene = Scene::load(&files.focused_on(&name), &name).unwrap();
+        let e = Encoding::of(&scene.bsp, &scene.entities, &scene.lights);
+        let all = luxels::all(&scene, &e);
+        println!("{name}: {} luxels, {} clamped, surfaces {}", all.len(), all.iter().filter(|l| l.clamped).count(), scene.bsp.surfaces.len());
+        let some: Vec<_> = all.iter().step_by(1 + all.len() / 5000).copied().filter(|l| !l.clamped).collect();
+        let occ = Occluders::new(&scene);
+        let terms = known::terms(&occ, &some, false, 1);
+        for t in &terms { println!("  {} {:?}", t.name, t.values.iter().copied().sum::<glam::Vec3>() / some.len() as f32); }
+        let sum: Vec<glam::Vec3> = (0..some.len()).map(|i| terms.iter().map(|t| t.values[i]).sum()).collect();
+        println!("  mean stored {:?} {:?}", some.iter().map(|l| l.stored).sum::<glam::Vec3>() / some.len() as f32, score(&sum, &some.iter().map(|l| l.stored).collect::<Vec<_>>()));
+        let mut worst: Vec<_> = some.iter().zip(&sum).collect();
+        worst.sort_by(|a, b| (*b.1 - b.0.stored).abs().max_element().total_cmp(&(*a.1 - a.0.stored).abs().max_element()));
+        for (l, p) in worst.iter().take(12).chain(worst.iter().skip(100).step_by(100).take(5)) {
+            println!("    {} n {} area {:.0} stored {} pred {} surf {} kind {}", l.position, l.normal, l.area, l.stored, p, l.surface, scene.bsp.surfaces[l.surface as usize].kind);
+        }
+        let mut sum2 = std::collections::BTreeMap::new();
+        for (l, p) in some.iter().zip(&sum) { let k = scene.bsp.shaders[scene.bsp.surfaces[l.surface as usize].shader as usize].name.text().into_owned(); let e: &mut Vec<(glam::Vec3, glam::Vec3)> = sum2.entry(k).or_default(); e.push((*p, l.stored)); }
+        for (k, v) in sum2 { if v.len() > 60 { let (a, b): (Vec<_>, Vec<_>) = v.into_iter().unzip(); println!("   {k} {} {:?}", a.len(), score(&a, &b)); } }
+    }
 }

@@ -80,9 +80,10 @@ impl Encoding {
         (255.0 / self.compensate + 1e-3) as u8
     }
 
-    /// Whether a luxel was clamped: all three of its channels are lower bounds then.
+    /// Whether a luxel was clamped: all three of its channels are lower bounds then. One byte less than the clamp's counts
+    /// too, because scaling 255/max·max is cut to 254 as often as not (whole maps have no 255).
     pub fn is_clamped(&self, bytes: [u8; 3]) -> bool {
-        bytes.into_iter().max().unwrap_or(0) >= self.clamp_byte()
+        bytes.into_iter().max().unwrap_or(0).saturating_add(1) >= self.clamp_byte()
     }
 
     /// Finds a map's encoding.

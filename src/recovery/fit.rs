@@ -64,6 +64,12 @@ impl Rows {
         Vec3::new(weight(residual.x), weight(residual.y), weight(residual.z))
     }
 
+    /// Cost summed over the fitting rows.
+    pub fn total_cost(&self, residual: &[Vec3]) -> f64 {
+        let cost = |row: usize| f64::from(self.cost(row, residual[row]));
+        (0..residual.len()).filter(|&row| self.train[row]).map(cost).sum()
+    }
+
     /// Mean cost over the rows that fit (`true`) or judge.
     pub fn mean_cost(&self, residual: &[Vec3], train: bool) -> f64 {
         let (mut sum, mut n) = (0.0, 0);

@@ -49,7 +49,7 @@ impl Default for Options {
             limits: Limits {
                 lights: 300,
                 candidates: 3000,
-                pays: 0.001,
+                pays: 0.0005,
             },
             hide_entities: false,
             hold_out_surfaces: false,

@@ -13,7 +13,7 @@ pub struct Limits {
     pub lights: usize,
     /// Candidates held at a time.
     pub candidates: usize,
-    /// Least share of the cost that a light must save to stay.
+    /// Least share of what all evidence costs unexplained that a light must save to stay.
     pub pays: f64,
 }
 
@@ -21,8 +21,8 @@ pub struct Limits {
 const APART: f32 = 160.0;
 /// Nothing is picked within this distance of a place that made things worse, units.
 const TABU: f32 = 48.0;
-/// Lights nearer to each other than this become one, units.
-const MERGE: f32 = 20.0;
+/// Lights nearer to each other than this may be one that was found in parts, units.
+const MERGE: f32 = 72.0;
 /// Rounds between new candidates, and between rounds over all lights.
 const REDRAW: usize = 4;
 const CYCLE: usize = 6;
@@ -30,6 +30,8 @@ const CYCLE: usize = 6;
 const PATIENCE: usize = 4;
 /// Share of the judging cost that counts as progress.
 const PROGRESS: f64 = 0.002;
+/// Final rounds over all lights.
+const SETTLING: usize = 3;
 /// Reach of the search for a light's place when it is new and when it has settled, units.
 const NEW_RADIUS: f32 = 32.0;
 const OLD_RADIUS: f32 = 12.0;
@@ -52,18 +54,22 @@ pub struct Solver<'a> {
     fixed: usize,
     places: Vec<Vec3>,
     limits: Limits,
+    /// Cost that a light must save to stay.
+    least: f64,
     label: u32,
 }
 
 impl<'a> Solver<'a> {
     /// Starts from a model of known columns only.
     pub fn new(search: &'a Search<'a>, model: Model, limits: Limits) -> Self {
+        let rows = search.rows;
         Self {
             search,
             fixed: model.columns.len(),
             model,
             places: Vec::new(),
             limits,
+            least: limits.pays * rows.total_cost(&rows.target),
             label: 0,
         }
     }
@@ -119,6 +125,7 @@ impl<'a> Solver<'a> {
             }
             self.model.refit(rows, 3, 15);
             if round % CYCLE == CYCLE - 1 {
+                self.merge();
                 self.cycle(OLD_RADIUS);
             }
             let now = self.judged();
@@ -143,7 +150,6 @@ impl<'a> Solver<'a> {
 
     /// The most saving places, apart from each other, each moved to where it saves most.
     fn pick(&mut self, candidates: &[Candidate], wanted: usize, tabu: &[Vec3]) -> Vec<Placed> {
-        let rows = self.search.rows;
         let residual = &self.model.residual;
         let mut gains: Vec<Placed> = candidates.par_iter().map(|c| c.gain(self.search, residual)).collect();
         gains.retain(|g| g.gain > 0.0 && tabu.iter().all(|t| t.distance(g.position) > TABU));
@@ -167,9 +173,7 @@ impl<'a> Solver<'a> {
                     .refine(p.position, NEW_RADIUS, label + i as u32, |row| residual[row])
             })
             .collect();
-        let fitting = rows.train.iter().filter(|t| **t).count() as f64;
-        let least = self.limits.pays * rows.mean_cost(residual, true) * fitting;
-        moved.into_iter().filter(|p| f64::from(p.gain) > least).collect()
+        moved.into_iter().filter(|p| f64::from(p.gain) > self.least).collect()
     }
 
     /// Moves every light to its best place given the others, those far apart at once.
@@ -215,33 +219,69 @@ impl<'a> Solver<'a> {
     /// Final rounds over all lights; near ones become one, and those that don't pay go.
     fn settle(&mut self) {
         let rows = self.search.rows;
+        for _ in 0..SETTLING {
+            self.cycle(OLD_RADIUS);
+            self.merge();
+            self.prune();
+        }
         self.cycle(OLD_RADIUS);
-        self.merge();
-        self.prune();
-        self.cycle(OLD_RADIUS);
-        self.prune();
         self.model.refit(rows, 4, 40);
     }
 
+    /// Makes one light of neighbours wherever one explains about as much.
     fn merge(&mut self) {
-        let mut i = 0;
-        while i < self.places.len() {
-            let near = (i + 1..self.places.len()).find(|&j| self.places[i].distance(self.places[j]) < MERGE);
-            let Some(j) = near else {
-                i += 1;
-                continue;
-            };
-            let (a, b) = (self.model.coefficients[self.fixed + i], self.model.coefficients[self.fixed + j]);
-            let (wa, wb) = (a.element_sum(), b.element_sum());
-            let middle = (self.places[i] * wa + self.places[j] * wb) / (wa + wb).max(f32::MIN_POSITIVE);
-            let place = if self.search.open(middle) { middle } else { self.places[i] };
+        let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
+        for i in 0..self.places.len() {
+            for j in i + 1..self.places.len() {
+                let d = self.places[i].distance(self.places[j]);
+                if d < MERGE {
+                    pairs.push((d, i, j));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut gone = vec![false; self.places.len()];
+        for (distance, i, j) in pairs {
+            if !gone[i] && !gone[j] && self.merge_pair(i, j, distance) {
+                gone[j] = true;
+            }
+        }
+        for j in (0..gone.len()).rev().filter(|&j| gone[j]) {
             self.model.remove(self.fixed + j);
             self.places.remove(j);
-            let column = self.search.column(place);
-            self.model.replace(self.fixed + i, column, a + b);
-            self.places[i] = place;
         }
         self.model.refit(self.search.rows, 2, 15);
+    }
+
+    /// Tries one light for two; where that is good enough the second is left without power.
+    fn merge_pair(&mut self, i: usize, j: usize, distance: f32) -> bool {
+        let rows = self.search.rows;
+        let (a, b) = (self.fixed + i, self.fixed + j);
+        let (pa, pb) = (self.model.coefficients[a], self.model.coefficients[b]);
+        let (wa, wb) = (pa.element_sum(), pb.element_sum());
+        let mut residual = self.model.residual.clone();
+        self.model.columns[a].add_to(&mut residual, pa);
+        self.model.columns[b].add_to(&mut residual, pb);
+        let middle = (self.places[i] * wa + self.places[j] * wb) / (wa + wb).max(f32::MIN_POSITIVE);
+        let start = if self.search.open(middle) {
+            middle
+        } else {
+            self.places[if wa >= wb { i } else { j }]
+        };
+        self.label += 1;
+        let placed = self
+            .search
+            .refine(start, distance * 0.5 + 8.0, self.label * 1024, |row| residual[row]);
+        let column = self.search.column(placed.position);
+        column.add_to(&mut residual, -placed.power);
+        let before = rows.total_cost(&self.model.residual);
+        if rows.total_cost(&residual) > before + self.least {
+            return false;
+        }
+        self.model.replace(b, Column::Free { rows: Vec::new(), values: Vec::new() }, Vec3::ZERO);
+        self.model.replace(a, column, placed.power);
+        self.places[i] = placed.position;
+        true
     }
 
     /// Cost (sum over fitting rows) that would come back without each light.
@@ -270,12 +310,10 @@ impl<'a> Solver<'a> {
 
     fn prune(&mut self) {
         let rows = self.search.rows;
-        let fitting = rows.train.iter().filter(|t| **t).count() as f64;
         loop {
-            let least = self.limits.pays * rows.mean_cost(&self.model.residual, true) * fitting;
             let worth = self.worth();
             // A few at a time: what one light explained, its neighbour may take over.
-            let mut poor: Vec<usize> = (0..worth.len()).filter(|&i| worth[i] < least).collect();
+            let mut poor: Vec<usize> = (0..worth.len()).filter(|&i| worth[i] < self.least).collect();
             poor.sort_by(|a, b| worth[*a].total_cmp(&worth[*b]));
             poor.truncate(1 + self.places.len() / 20);
             if poor.is_empty() {
@@ -293,8 +331,7 @@ impl<'a> Solver<'a> {
     /// The lights found.
     pub fn found(&self) -> Vec<Found> {
         let worth = self.worth();
-        let total = self.search.rows.mean_cost(&self.search.rows.target, true)
-            * self.search.rows.train.iter().filter(|t| **t).count() as f64;
+        let total = self.search.rows.total_cost(&self.search.rows.target);
         self.places
             .iter()
             .zip(&self.model.coefficients[self.fixed..])
