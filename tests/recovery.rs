@@ -49,7 +49,7 @@ fn truth(scene: &Scene, r: &q3rays::recovery::Recovery) {
     let truth: Vec<(glam::Vec3, f32)> = scene.lights.lights.iter().zip(&scene.lights.sources)
         .filter(|(_, s)| matches!(s, LightSource::PointEntity | LightSource::SpotEntity))
         .map(|(l, _)| (glam::Vec3::from(l.p0), l.p2[2] * 255.0)).collect();
-    if truth.is_empty() { return; }
+    if truth.is_empty() || r.lights.is_empty() { return; }
     let mut d: Vec<(f32, f32)> = truth.iter().map(|(p, n)| r.lights.iter().map(|l| (l.position.distance(*p), l.power.max_element() / n)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1e9, 0.0))).collect();
     let within = |x: f32| d.iter().filter(|(d, _)| *d <= x).count();
     let (w16, w32, w48, w64) = (within(16.0), within(32.0), within(48.0), within(64.0));
@@ -60,7 +60,8 @@ fn truth(scene: &Scene, r: &q3rays::recovery::Recovery) {
         let mut all: Vec<_> = r.lights.iter().map(|l| (l.share, truth.iter().map(|t| t.0.distance(l.position)).fold(1e9f32, f32::min), l.power.max_element())).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         println!("      {}", all.iter().map(|(s, d, p)| format!("{:.2}%:{d:.0}:{p:.0}", s * 100.0)).collect::<Vec<_>>().join(" "));
-        for ((p, n), (d, q)) in truth.iter().zip(&d) { if *d > 24.0 { println!("      missed {p} N {n} nearest {d:.0} ratio {q:.2}"); } }
+        for ((p, n), (d, q)) in truth.iter().zip(&d) { if *d > 24.0 { let l = r.lights.iter().min_by(|a, b| a.position.distance(*p).total_cmp(&b.position.distance(*p))).unwrap();
+            println!("      missed {p} N {n} nearest {d:.0} ratio {q:.2}: {}", l.position); } }
     }
     d.sort_by(|a, b| a.0.total_cmp(&b.0));
 }
@@ -89,5 +90,31 @@ fn debug_known() {
         let mut sum2 = std::collections::BTreeMap::new();
         for (l, p) in some.iter().zip(&sum) { let k = scene.bsp.shaders[scene.bsp.surfaces[l.surface as usize].shader as usize].name.text().into_owned(); let e: &mut Vec<(glam::Vec3, glam::Vec3)> = sum2.entry(k).or_default(); e.push((*p, l.stored)); }
         for (k, v) in sum2 { if v.len() > 60 { let (a, b): (Vec<_>, Vec<_>) = v.into_iter().unzip(); println!("   {k} {} {:?}", a.len(), score(&a, &b)); } }
+    }
+}
+
+#[test]
+#[ignore]
+fn residuals() {
+    use q3rays::recovery::{Options, recover};
+    let files = common::installed();
+    let options = Options { hide_entities: std::env::var("SHOW").is_err(), ..Options::default() };
+    for name in maps() {
+        let scene = Scene::load(&files.focused_on(&name), &name).unwrap();
+        let r = recover(&scene, &options, &|_| {}).unwrap();
+        println!("{name} {:?}", r.scores);
+        truth(&scene, &r);
+        let mut rows: Vec<_> = r.luxels.iter().filter(|l| l.held_out && !l.clamped).collect();
+        let err = |l: &q3rays::recovery::recover::LuxelRow| (l.stored - l.known - l.recovered - l.indirect).length_squared();
+        let total: f32 = rows.iter().map(|l| err(l)).sum();
+        rows.sort_by(|a, b| err(b).total_cmp(&err(a)));
+        let mut cum = 0.0;
+        for (i, l) in rows.iter().enumerate() {
+            cum += err(l);
+            if i % (rows.len() / 400).max(1) == 0 && i < rows.len() / 8 { println!("  {:.2} {} n {} stored {:.2} known {:.2} rec {:.2} ind {:.2}", cum / total, l.position.round(), l.normal, l.stored, l.known, l.recovered, l.indirect); }
+        }
+        let mut by: std::collections::BTreeMap<u32, (usize, f32, f32, f32)> = Default::default();
+        for l in &rows { let k = (l.stored.element_sum() / 3.0 * 255.0).log2().max(0.0) as u32; let e = by.entry(k).or_default(); e.0 += 1; e.1 += l.stored.element_sum(); e.2 += (l.known + l.recovered + l.indirect).element_sum(); e.3 += err(l); }
+        for (k, v) in by { println!("  2^{k}: {} stored {:.4} pred {:.4} err {:.2}", v.0, v.1 / v.0 as f32 / 3.0, v.2 / v.0 as f32 / 3.0, v.3 / total); }
     }
 }

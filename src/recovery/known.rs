@@ -268,7 +268,8 @@ fn surfaces(
                     Some(e.splash.0)
                 };
                 if let Some(p) = target {
-                    seen += usize::from(occluders.sees(luxel.origin(p - luxel.position), p));
+                    let place = spread(occluders, luxel, random);
+                    seen += usize::from(occluders.sees(place.origin(p - place.position), p));
                 }
             }
         }
@@ -277,6 +278,16 @@ fn surfaces(
         }
     }
     values
+}
+
+/// A luxel's place for one ray: at random as `-filter` spreads light (1 2 1 is a triangle of half width 1), if it does.
+fn spread(occluders: &Occluders, luxel: &Luxel, random: &mut Random) -> Luxel {
+    if !occluders.filtered {
+        return *luxel;
+    }
+    let triangle = |random: &mut Random| random.unit() - random.unit();
+    let place = luxel.moved(triangle(random), triangle(random));
+    if occluders.open(&place) { place } else { *luxel }
 }
 
 /// A point just before an emitter, on its side of the receiver's horizon.
@@ -297,7 +308,7 @@ fn others(occluders: &Occluders, of_light: &[u32], luxel: &Luxel, values: &mut [
     for side in 0..sides {
         let normal = if side == 0 { luxel.normal } else { -luxel.normal };
         let at = receiver(luxel, normal);
-        let origin = luxel.position + normal * super::luxels::SAMPLE_OFFSET;
+        let offset = normal * super::luxels::SAMPLE_OFFSET;
         for l in scene.rows.pvs.lights(luxel.cluster) {
             let term = of_light[l as usize];
             let light = &scene.lights.lights[l as usize];
@@ -305,6 +316,7 @@ fn others(occluders: &Occluders, of_light: &[u32], luxel: &Luxel, values: &mut [
                 LightSource::EmissiveTriangle | LightSource::SkyTriangle => continue,
                 LightSource::Sun => SUN_RAYS,
                 LightSource::SkyDome => DOME_RAYS,
+                _ if occluders.filtered => SUN_RAYS,
                 _ => 1,
             };
             if term == NONE {
@@ -320,6 +332,7 @@ fn others(occluders: &Occluders, of_light: &[u32], luxel: &Luxel, values: &mut [
                 let Some(sample) = sample_light(scene, light, &at, u, rays > 1) else {
                     continue;
                 };
+                let origin = spread(occluders, luxel, random).position + offset;
                 let seen = match sample.target {
                     Target::Point(p) => occluders.sees(origin, p),
                     Target::Sky(direction) => occluders.sees_sky(origin, direction),

@@ -2,7 +2,8 @@
 
 use super::encoding::Encoding;
 use super::random::Random;
-use crate::assets::bsp::lumps::{LIGHTMAP_BYTES, LIGHTMAP_SIZE};
+use crate::assets::bsp::Bsp;
+use crate::assets::bsp::lumps::{LIGHTMAP_BYTES, LIGHTMAP_SIZE, content_flags};
 use crate::scene::Scene;
 use crate::scene::clusters::cluster_at;
 use crate::scene::material::Visibility;
@@ -40,6 +41,14 @@ impl Luxel {
     pub fn origin(&self, direction: Vec3) -> Vec3 {
         let back = self.two_sided && self.normal.dot(direction) < 0.0;
         self.position + self.normal * if back { -SAMPLE_OFFSET } else { SAMPLE_OFFSET }
+    }
+
+    /// A place around the centre as `-filter` spreads each light: `u` and `v` in luxels along the page.
+    pub fn moved(&self, u: f32, v: f32) -> Self {
+        Self {
+            position: self.position + self.steps[0] * u + self.steps[1] * v,
+            ..*self
+        }
     }
 
     /// Cosine of a unit direction as the compiler counts it.
@@ -138,7 +147,11 @@ fn luxel(
         .map(|v| Vec3::from(scene.geometry.attributes[v as usize].normal));
     let normal = (na * (1.0 - w1 - w2) + nb * w1 + nc * w2).try_normalize()?;
     let steps = slopes.map(|[s1, s2]| e1 * s1 + e2 * s2);
-    let cluster = cluster_at(&scene.bsp_nodes, position + normal * SAMPLE_OFFSET)?;
+    let origin = position + normal * SAMPLE_OFFSET;
+    let cluster = cluster_at(&scene.bsp_nodes, origin)?;
+    if in_solid_brush(&scene.bsp, origin) {
+        return None;
+    }
     let bytes: [u8; 3] = std::array::from_fn(|i| scene.bsp.lightmaps[texel * 3 + i]);
     Some(Luxel {
         position,
@@ -150,6 +163,26 @@ fn luxel(
         two_sided: scene.material_sources[triangle.material as usize].two_sided,
         surface: triangle.surface,
         cluster,
+    })
+}
+
+/// Whether a point in an open leaf lies inside a solid (detail) brush there.
+fn in_solid_brush(bsp: &Bsp, point: Vec3) -> bool {
+    let Some(leaf) = bsp.leaf_at(point).map(|leaf| &bsp.leafs[leaf]) else {
+        return false;
+    };
+    let first = leaf.first_leaf_brush as usize;
+    let numbers = &bsp.leaf_brushes[first..first + leaf.leaf_brush_count as usize];
+    numbers.iter().any(|&b| {
+        let brush = &bsp.brushes[b as usize];
+        let contents = bsp.shaders[brush.shader as usize].content_flags;
+        let sides = &bsp.brush_sides[brush.first_side as usize..(brush.first_side + brush.side_count) as usize];
+        contents & content_flags::SOLID != 0
+            && contents & content_flags::TRANSLUCENT == 0
+            && sides.iter().all(|side| {
+                let plane = &bsp.planes[side.plane as usize];
+                Vec3::from(plane.normal).dot(point) < plane.dist
+            })
     })
 }
 

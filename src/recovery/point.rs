@@ -59,9 +59,9 @@ impl Search<'_> {
         cluster_at(&self.occluders.scene.bsp_nodes, position).is_some()
     }
 
-    /// The whole column of a light.
-    pub fn column(&self, position: Vec3) -> Column {
-        let (rows, mut values) = column(self.occluders, self.luxels, position);
+    /// The whole column of a light of about a power.
+    pub fn column(&self, position: Vec3, power: Vec3) -> Column {
+        let (rows, mut values) = column(self.occluders, self.luxels, position, reach(power));
         values
             .iter_mut()
             .zip(&rows)
@@ -213,8 +213,13 @@ impl Search<'_> {
     }
 }
 
+/// How far the compiler lets a light act: where it gives a byte at most, units.
+pub fn reach(power: Vec3) -> f32 {
+    (7500.0 * power.max_element()).sqrt()
+}
+
 /// Rows that a light reaches and its irradiance there at power 1.
-pub fn column(occluders: &Occluders, luxels: &[Luxel], position: Vec3) -> (Vec<u32>, Vec<f32>) {
+pub fn column(occluders: &Occluders, luxels: &[Luxel], position: Vec3, reach: f32) -> (Vec<u32>, Vec<f32>) {
     let scene = occluders.scene;
     let Some(cluster) = cluster_at(&scene.bsp_nodes, position) else {
         return (Vec::new(), Vec::new());
@@ -224,12 +229,15 @@ pub fn column(occluders: &Occluders, luxels: &[Luxel], position: Vec3) -> (Vec<u
         .iter()
         .enumerate()
         .filter_map(|(row, luxel)| {
-            if !visible.contains(luxel.cluster) {
+            if !visible.contains(luxel.cluster) || luxel.position.distance_squared(position) > reach * reach {
                 return None;
             }
             let value = unshadowed(luxel, position);
-            let lit = value > FAINT && occluders.sees(luxel.origin(position - luxel.position), position);
-            lit.then_some((row as u32, value))
+            if value <= FAINT {
+                return None;
+            }
+            let lit = occluders.lit(luxel, position, |l| unshadowed(l, position));
+            (lit > 0.0).then_some((row as u32, lit))
         })
         .unzip()
 }

@@ -5,11 +5,11 @@ use super::fit::{Column, Model, Rows};
 use super::gather::{Gathered, dirt, gather};
 use super::known::{Term, TermKind, terms};
 use super::luxels::{self, Luxel, choose, held_out_surface};
-use super::point::{Search, column};
+use super::point::{Search, column, reach};
 use super::random::Random;
 use super::score::{Score, Scores, score};
 use super::solve::{Found, Limits, Solver};
-use super::visibility::Occluders;
+use super::visibility::{Occluders, compiled_with};
 use crate::scene::Scene;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -185,13 +185,6 @@ fn darken(gathered: &mut [Gathered], terms: &mut [Term], dirt: &[f32]) {
     }
 }
 
-/// Whether the compiler was told to darken corners.
-fn was_dirty(scene: &Scene) -> bool {
-    let worldspawn = scene.entities.iter().find(|e| e.class() == "worldspawn");
-    let command = worldspawn.and_then(|w| w.get("_q3map2_cmdline")).unwrap_or("");
-    command.split([' ', ';', '\t']).any(|w| w.eq_ignore_ascii_case("-dirty"))
-}
-
 /// Recovers the lights of a map. `progress` gets the share done, 0..1.
 ///
 /// # Errors
@@ -220,7 +213,7 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     timer.lap("known");
     progress(0.1);
     let mut gathered = gather(&occluders, &encoding, &luxels, options.seed);
-    let dirty = was_dirty(scene);
+    let dirty = compiled_with(scene, "-dirty");
     let dirt = if dirty { dirt(&occluders, &luxels) } else { vec![1.0; luxels.len()] };
     darken(&mut gathered, &mut terms, &dirt);
     timer.lap("gathered");
@@ -302,7 +295,7 @@ impl<'a> Held<'a> {
         let lights: Vec<Column> = found
             .par_iter()
             .map(|f| {
-                let (rows, mut values) = column(occluders, luxels, f.position);
+                let (rows, mut values) = column(occluders, luxels, f.position, reach(f.power));
                 values.iter_mut().zip(&rows).for_each(|(v, row)| *v *= dirt[*row as usize]);
                 Column::Free { rows, values }
             })

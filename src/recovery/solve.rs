@@ -119,7 +119,7 @@ impl<'a> Solver<'a> {
             }
             let kept = (self.model.clone(), self.places.clone());
             for p in &picks {
-                let column = self.search.column(p.position);
+                let column = self.search.column(p.position, p.power);
                 self.model.push(column, p.power);
                 self.places.push(p.position);
             }
@@ -203,7 +203,7 @@ impl<'a> Solver<'a> {
                     let label = self.label * 1024 + i as u32;
                     let placed = self.search.refine(self.places[i], radius, label, residual);
                     let changed = placed.position != self.places[i] && placed.gain > 0.0;
-                    (i, changed.then(|| (placed, self.search.column(placed.position))))
+                    (i, changed.then(|| (placed, self.search.column(placed.position, placed.power))))
                 })
                 .collect();
             for (i, change) in moved {
@@ -272,7 +272,7 @@ impl<'a> Solver<'a> {
         let placed = self
             .search
             .refine(start, distance * 0.5 + 8.0, self.label * 1024, |row| residual[row]);
-        let column = self.search.column(placed.position);
+        let column = self.search.column(placed.position, placed.power);
         column.add_to(&mut residual, -placed.power);
         let before = rows.total_cost(&self.model.residual);
         if rows.total_cost(&residual) > before + self.least {

@@ -1,7 +1,9 @@
 //! Visibility as the map compiler saw it: solid leafs and opaque drawn surfaces of the world, no brush models.
 
+use super::luxels::Luxel;
 use crate::reference::trace::{Hit, Tracer};
 use crate::scene::Scene;
+use crate::scene::clusters::cluster_at;
 use crate::scene::records::BspNode;
 use glam::Vec3;
 
@@ -11,6 +13,8 @@ const REACH: f64 = 0.999;
 /// The occluders of a scene's world model.
 pub struct Occluders<'a> {
     pub scene: &'a Scene,
+    /// The compiler blurred each light over neighbouring luxels (`-filter`).
+    pub filtered: bool,
     tracer: Tracer,
 }
 
@@ -19,7 +23,45 @@ impl<'a> Occluders<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let mut tracer = Tracer::new(scene);
         tracer.instances.retain(|i| i.mesh == 0);
-        Self { scene, tracer }
+        Self {
+            scene,
+            filtered: compiled_with(scene, "-filter"),
+            tracer,
+        }
+    }
+
+    /// Places around a luxel that stand for it, as many as `rays` tells at most: `-filter` blurs each light with 1 2 1 over
+    /// rows and columns, which four places have the same second moments as.
+    pub fn places(&self, luxel: &Luxel) -> impl Iterator<Item = Luxel> {
+        const SPREAD: f32 = std::f32::consts::FRAC_1_SQRT_2;
+        let spread = if self.filtered { SPREAD } else { 0.0 };
+        let around = [(-spread, -spread), (spread, -spread), (-spread, spread), (spread, spread)];
+        let luxel = *luxel;
+        around
+            .into_iter()
+            .take(if self.filtered { 4 } else { 1 })
+            .map(move |(u, v)| luxel.moved(u, v))
+    }
+
+    /// Whether a luxel's sample there would lie in the open.
+    pub fn open(&self, luxel: &Luxel) -> bool {
+        cluster_at(&self.scene.bsp_nodes, luxel.origin(luxel.normal)).is_some()
+    }
+
+    /// Mean over a luxel's places of the light from a point, `value` being the unshadowed one; 0 where all are in solid.
+    pub fn lit(&self, luxel: &Luxel, point: Vec3, value: impl Fn(&Luxel) -> f32) -> f32 {
+        let (mut sum, mut count) = (0.0, 0);
+        for place in self.places(luxel) {
+            if self.filtered && !self.open(&place) {
+                continue;
+            }
+            count += 1;
+            let v = value(&place);
+            if v > 0.0 && self.sees(place.origin(point - place.position), point) {
+                sum += v;
+            }
+        }
+        sum / count.max(1) as f32
     }
 
     /// Whether a point is seen from another; both should lie in the open.
@@ -73,4 +115,11 @@ fn crosses_solid(nodes: &[BspNode], from: Vec3, to: Vec3) -> bool {
         }
     }
     false
+}
+
+/// Whether a switch stands in the compiler's command line that worldspawn records.
+pub fn compiled_with(scene: &Scene, switch: &str) -> bool {
+    let worldspawn = scene.entities.iter().find(|e| e.class() == "worldspawn");
+    let command = worldspawn.and_then(|w| w.get("_q3map2_cmdline")).unwrap_or("");
+    command.split([' ', ';', '\t']).any(|w| w.eq_ignore_ascii_case(switch))
 }
