@@ -118,3 +118,18 @@ fn residuals() {
         for (k, v) in by { println!("  2^{k}: {} stored {:.4} pred {:.4} err {:.2}", v.0, v.1 / v.0 as f32 / 3.0, v.2 / v.0 as f32 / 3.0, v.3 / total); }
     }
 }
+
+#[test]
+#[ignore]
+fn known_only() {
+    use q3rays::recovery::{Options, recover};
+    let files = common::installed();
+    let mut options = Options::default();
+    options.limits.lights = 0;
+    for name in maps() {
+        let scene = Scene::load(&files.focused_on(&name), &name).unwrap();
+        let r = recover(&scene, &options, &|_| {}).unwrap();
+        let f = |s: q3rays::recovery::score::Score| format!("{:.3}/{:.2}", s.correlation, s.ratio);
+        println!("{name:15} known {} scaled {} ind {:.2}", f(r.scores.known), f(r.scores.known_scaled), r.indirect);
+    }
+}

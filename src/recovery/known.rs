@@ -55,6 +55,10 @@ const BACKSPLASH: f32 = 1.0 / 60.0 / 5.0;
 /// No point light is nearer than this, units.
 pub const NEAREST: f32 = 16.0;
 
+/// Least extent that emitters are cut to, units, and most pieces of one triangle.
+const LEAST_PIECE: f32 = 8.0;
+const MOST_PIECES: usize = 256;
+
 struct Emitter {
     term: u32,
     corners: [Vec3; 3],
@@ -73,12 +77,18 @@ pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, seed: u32
     let scene = occluders.scene;
     let (kinds, of_light) = kinds(scene, hidden);
     let radiance: Vec<Vec3> = kinds.iter().map(|k| term_radiance(scene, k)).collect();
-    let emitters: Vec<Option<Emitter>> = scene
+    let emitters: Vec<Vec<Emitter>> = scene
         .lights
         .lights
         .iter()
         .zip(&of_light)
-        .map(|(light, &term)| (light.kind == LIGHT_TRIANGLE && term != NONE).then(|| emitter(scene, light, term)))
+        .map(|(light, &term)| {
+            if light.kind == LIGHT_TRIANGLE && term != NONE {
+                emitters(scene, light, term)
+            } else {
+                Vec::new()
+            }
+        })
         .collect();
     let rows: Vec<Vec<Vec3>> = receivers
         .par_iter()
@@ -138,26 +148,43 @@ fn term_radiance(scene: &Scene, kind: &TermKind) -> Vec3 {
     }
 }
 
-fn emitter(scene: &Scene, light: &Light, term: u32) -> Emitter {
+/// The pieces that the compiler makes of an emissive triangle: halved along its longest edge while it is too large.
+fn emitters(scene: &Scene, light: &Light, term: u32) -> Vec<Emitter> {
     let p0 = Vec3::from(light.p0);
     let (e1, e2) = (Vec3::from(light.p1), Vec3::from(light.p2));
-    let corners = [p0, p0 + e1, p0 + e2];
-    let centre = p0 + (e1 + e2) / 3.0;
     let normal = e1.cross(e2).normalize_or(Vec3::Z);
-    let [percent, distance] = scene.material_sources[light.material as usize].backsplash;
-    Emitter {
-        term,
-        corners,
-        centre,
-        normal,
-        area: light.size,
-        size2: corners.map(|c| c.distance_squared(centre)).into_iter().fold(0.0, f32::max),
-        two_sided: light.flags & LIGHT_TWO_SIDED != 0,
-        splash: (
-            centre + normal * (distance + 1.0),
-            percent.max(0.0) * BACKSPLASH * light.size,
-        ),
+    let source = &scene.material_sources[light.material as usize];
+    let [percent, distance] = source.backsplash;
+    let most = source.light_subdivide.max(LEAST_PIECE);
+    let mut waiting = vec![[p0, p0 + e1, p0 + e2]];
+    let mut out = Vec::new();
+    while let Some([a, b, c]) = waiting.pop() {
+        let (least, greatest) = (a.min(b).min(c), a.max(b).max(c));
+        if (greatest - least).max_element() > most && out.len() + waiting.len() < MOST_PIECES {
+            // The longest edge first.
+            let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]]
+                .into_iter()
+                .max_by(|x, y| x[0].distance(x[1]).total_cmp(&y[0].distance(y[1])))
+                .unwrap_or([a, b, c]);
+            let middle = (a + b) * 0.5;
+            waiting.push([a, middle, c]);
+            waiting.push([middle, b, c]);
+            continue;
+        }
+        let centre = (a + b + c) / 3.0;
+        let area = (b - a).cross(c - a).length() * 0.5;
+        out.push(Emitter {
+            term,
+            corners: [a, b, c],
+            centre,
+            normal,
+            area,
+            size2: [a, b, c].map(|p| p.distance_squared(centre)).into_iter().fold(0.0, f32::max),
+            two_sided: light.flags & LIGHT_TWO_SIDED != 0,
+            splash: (centre + normal * (distance + 1.0), percent.max(0.0) * BACKSPLASH * area),
+        });
     }
+    out
 }
 
 /// Lambert's form factor of a triangle as seen from a receiver, clipped at its horizon: E/π for radiance 1.
@@ -225,21 +252,22 @@ fn splash(e: &Emitter, luxel: &Luxel) -> f32 {
 /// The value of every surface term: exact without occluders, times the share of rays that arrive.
 fn surfaces(
     occluders: &Occluders,
-    emitters: &[Option<Emitter>],
+    emitters: &[Vec<Emitter>],
     radiance: &[Vec3],
     luxel: &Luxel,
     random: &mut Random,
 ) -> Vec<Vec3> {
     let scene = occluders.scene;
     let mut values = vec![Vec3::ZERO; radiance.len()];
-    let mut parts: Vec<(u32, u32, f32)> = Vec::new();
+    let mut parts: Vec<(&Emitter, bool, f32)> = Vec::new();
     let mut totals = vec![0.0f32; radiance.len()];
     for l in scene.rows.pvs.lights(luxel.cluster) {
-        let Some(e) = &emitters[l as usize] else { continue };
-        for (part, value) in [direct(e, luxel), splash(e, luxel)].into_iter().enumerate() {
-            if value > 0.0 {
-                parts.push((l, part as u32, value));
-                totals[e.term as usize] += value;
+        for e in &emitters[l as usize] {
+            for (splashed, value) in [(false, direct(e, luxel)), (true, splash(e, luxel))] {
+                if value > 0.0 {
+                    parts.push((e, splashed, value));
+                    totals[e.term as usize] += value;
+                }
             }
         }
     }
@@ -253,8 +281,7 @@ fn surfaces(
         let step = totals[k] / n as f32;
         let mut next = random.unit() * step;
         let (mut sum, mut seen, mut cast) = (0.0, 0, 0);
-        for &(l, part, value) in &parts {
-            let Some(e) = &emitters[l as usize] else { continue };
+        for &(e, splashed, value) in &parts {
             if e.term as usize != k {
                 continue;
             }
@@ -262,10 +289,10 @@ fn surfaces(
             while sum > next {
                 next += step;
                 cast += 1;
-                let target = if part == 0 {
-                    point_on(e, luxel, random)
-                } else {
+                let target = if splashed {
                     Some(e.splash.0)
+                } else {
+                    point_on(e, luxel, random)
                 };
                 if let Some(p) = target {
                     let place = spread(occluders, luxel, random);

@@ -2,7 +2,7 @@
 
 use super::encoding::Encoding;
 use super::fit::{Column, Model, Rows};
-use super::gather::{Gathered, dirt, gather};
+use super::gather::{Gather, Gathered, dirt};
 use super::known::{Term, TermKind, terms};
 use super::luxels::{self, Luxel, choose, held_out_surface};
 use super::point::{Search, column, reach};
@@ -49,7 +49,7 @@ impl Default for Options {
             limits: Limits {
                 lights: 300,
                 candidates: 3000,
-                pays: 0.0005,
+                pays: 0.0002,
             },
             hide_entities: false,
             hold_out_surfaces: false,
@@ -174,14 +174,11 @@ fn fixed_columns(gathered: &[Gathered], dirt: &[f32], terms: &[Term], range: std
     columns
 }
 
-/// Darkens what is gathered and known as `-dirty` does.
-fn darken(gathered: &mut [Gathered], terms: &mut [Term], dirt: &[f32]) {
-    for (i, d) in dirt.iter().enumerate() {
-        gathered[i].indirect *= *d;
-        gathered[i].sky *= *d;
-        for t in terms.iter_mut() {
-            t.values[i] *= *d;
-        }
+/// Darkens what is gathered as `-dirty` does.
+fn darken(gathered: &mut [Gathered], dirt: &[f32]) {
+    for (g, d) in gathered.iter_mut().zip(dirt) {
+        g.indirect *= *d;
+        g.sky *= *d;
     }
 }
 
@@ -212,10 +209,13 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     let mut terms = terms(&occluders, &luxels, options.hide_entities, options.seed);
     timer.lap("known");
     progress(0.1);
-    let mut gathered = gather(&occluders, &encoding, &luxels, options.seed);
+    let mut gathered = Gather::new(&occluders, encoding, Vec::new()).all(&luxels, options.seed);
     let dirty = compiled_with(scene, "-dirty");
     let dirt = if dirty { dirt(&occluders, &luxels) } else { vec![1.0; luxels.len()] };
-    darken(&mut gathered, &mut terms, &dirt);
+    for (i, d) in dirt.iter().enumerate() {
+        terms.iter_mut().for_each(|t| t.values[i] *= *d);
+    }
+    darken(&mut gathered, &dirt);
     timer.lap("gathered");
     progress(0.2);
     let fit_luxels = &luxels[..fitted];
@@ -235,7 +235,14 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
             dirt: &dirt[..fitted],
         };
         let mut solver = Solver::new(&search, model, options.limits);
-        solver.run(&|share| progress(0.2 + 0.75 * share));
+        solver.run(&|share| progress(0.2 + 0.5 * share));
+        // Clamped luxels reflect more than they show: the lights found tell how much.
+        let lights = solver.found().iter().map(|f| (f.position, f.power)).collect();
+        gathered = Gather::new(&occluders, encoding, lights).all(&luxels, options.seed);
+        darken(&mut gathered, &dirt);
+        let indirect = gathered[..fitted].iter().map(|g| g.indirect).collect();
+        solver.replace_fixed(INDIRECT, tinted(indirect, 1.0));
+        solver.run(&|share| progress(0.7 + 0.25 * share));
         found = solver.found();
         model = solver.into_model();
     }

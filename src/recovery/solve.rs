@@ -78,18 +78,25 @@ impl<'a> Solver<'a> {
         self.search.rows.mean_cost(&self.model.residual, false)
     }
 
-    fn candidates(&self, round: usize) -> Vec<Candidate> {
+    fn candidates(&mut self) -> Vec<Candidate> {
         let rows = self.search.rows;
-        if round == 0 {
+        self.label += 1;
+        if self.places.is_empty() {
             let brightness = |i: usize| rows.target[i].max_element().min(0.63);
-            draw(self.search, self.limits.candidates, 0, brightness)
+            draw(self.search, self.limits.candidates, self.label, brightness)
         } else {
             let missing = |i: usize| {
                 let r = (self.model.residual[i] * rows.weight[i]).max(Vec3::ZERO);
                 r.max_element().powf(1.5)
             };
-            draw(self.search, self.limits.candidates, round as u32, missing)
+            draw(self.search, self.limits.candidates, self.label, missing)
         }
+    }
+
+    /// Puts other values in the place of a known column.
+    pub fn replace_fixed(&mut self, index: usize, column: Column) {
+        let coefficient = self.model.coefficients[index];
+        self.model.replace(index, column, coefficient);
     }
 
     /// Adds lights until they stop paying, then settles, merges and prunes. `progress` gets the share done, 0..1.
@@ -104,11 +111,11 @@ impl<'a> Solver<'a> {
         let mut round = 0;
         while self.places.len() < self.limits.lights && idle < PATIENCE {
             if round % REDRAW == 0 {
-                candidates = self.candidates(round);
+                candidates = self.candidates();
             }
-            let wanted = match round {
-                0..3 => 2,
-                3..8 => 4,
+            let wanted = match self.places.len() {
+                0..6 => 2,
+                6..24 => 4,
                 _ => 8,
             };
             let picks = self.pick(&candidates, wanted, &tabu);

@@ -24,6 +24,9 @@ const UNLIT_SKY: f32 = 64.0 / 255.0;
 /// The compiler's `q3map_backsplash` where a script has none.
 const BACKSPLASH: [f32; 2] = [5.0, 23.0];
 
+/// The compiler's `q3map_lightSubdivide` where a script has none.
+const LIGHT_SUBDIVIDE: f32 = 999.0;
+
 /// Decoded means below this in any channel belong to night skies.
 const DARK_SKY: f32 = 0.02;
 
@@ -69,6 +72,8 @@ pub struct MaterialSource {
     /// `q3map_backsplash`: percent of the emitted light that the compiler throws back at the mounting, and from how far in
     /// front of it, units.
     pub backsplash: [f32; 2],
+    /// `q3map_lightSubdivide`: greatest extent of one emitting piece, units.
+    pub light_subdivide: f32,
     /// Images that give the emitted colour, the first that loads.
     colour_images: Vec<u32>,
     /// `q3map_lightRGB`.
@@ -154,6 +159,7 @@ impl MaterialSource {
                 suns: Vec::new(),
                 sky_light: None,
                 backsplash: BACKSPLASH,
+                light_subdivide: LIGHT_SUBDIVIDE,
                 colour_images: Vec::new(),
                 colour_rgb: None,
                 colour: Vec3::ONE,
@@ -200,6 +206,11 @@ impl MaterialSource {
                 .compiler
                 .backsplash
                 .map_or(BACKSPLASH, |b| [b.percent, b.distance]),
+            light_subdivide: shader
+                .compiler
+                .light_subdivide
+                .filter(|s| *s > 0.0)
+                .unwrap_or(LIGHT_SUBDIVIDE),
             colour_rgb,
             colour: Vec3::ONE,
         }
