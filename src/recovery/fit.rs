@@ -8,7 +8,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 /// Error scale of dark luxels, luxel units, and its growth with what is stored.
-const ERROR_FLOOR: f32 = 8.0 / 255.0;
+const ERROR_FLOOR: f32 = 4.0 / 255.0;
 const ERROR_SHARE: f32 = 0.15;
 /// Scaled error beyond which it counts linearly.
 const HUBER: f32 = 3.0;

@@ -5,7 +5,7 @@
 
 use super::luxels::Luxel;
 use super::random::Random;
-use super::visibility::Occluders;
+use super::visibility::{Occluders, compiled_with};
 use crate::reference::light_sample::{Target, sample_light};
 use crate::reference::surface::SurfaceHit;
 use crate::scene::Scene;
@@ -70,6 +70,8 @@ struct Emitter {
     two_sided: bool,
     /// Where the backsplash is, and its strength relative to the radiance.
     splash: (Vec3, f32),
+    /// Squares of the distances at which light and backsplash are a byte at most and `-fast` drops them.
+    reach2: [f32; 2],
 }
 
 /// Collects the terms of a scene; light entities are left out where they are `hidden`.
@@ -77,6 +79,7 @@ pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, seed: u32
     let scene = occluders.scene;
     let (kinds, of_light) = kinds(scene, hidden);
     let radiance: Vec<Vec3> = kinds.iter().map(|k| term_radiance(scene, k)).collect();
+    let fast = fast(scene);
     let emitters: Vec<Vec<Emitter>> = scene
         .lights
         .lights
@@ -84,7 +87,7 @@ pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, seed: u32
         .zip(&of_light)
         .map(|(light, &term)| {
             if light.kind == LIGHT_TRIANGLE && term != NONE {
-                emitters(scene, light, term)
+                emitters(scene, light, term, fast)
             } else {
                 Vec::new()
             }
@@ -109,6 +112,11 @@ pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, seed: u32
             values: rows.iter().map(|r| r[k]).collect(),
         })
         .collect()
+}
+
+/// Whether the compiler ended every light where it gives a byte: with `-fast`, which nearly all recorded command lines have.
+fn fast(scene: &Scene) -> bool {
+    compiled_with(scene, "-fast") || !compiled_with(scene, "-light")
 }
 
 /// The terms in order, and the term of each light.
@@ -149,12 +157,13 @@ fn term_radiance(scene: &Scene, kind: &TermKind) -> Vec3 {
 }
 
 /// The pieces that the compiler makes of an emissive triangle: halved along its longest edge while it is too large.
-fn emitters(scene: &Scene, light: &Light, term: u32) -> Vec<Emitter> {
+fn emitters(scene: &Scene, light: &Light, term: u32, fast: bool) -> Vec<Emitter> {
     let p0 = Vec3::from(light.p0);
     let (e1, e2) = (Vec3::from(light.p1), Vec3::from(light.p2));
     let normal = e1.cross(e2).normalize_or(Vec3::Z);
     let source = &scene.material_sources[light.material as usize];
     let [percent, distance] = source.backsplash;
+    let strongest = source.emission().map_or(0.0, |e| e.radiance.max_element()) * 255.0;
     let most = source.light_subdivide.max(LEAST_PIECE);
     let mut waiting = vec![[p0, p0 + e1, p0 + e2]];
     let mut out = Vec::new();
@@ -181,6 +190,11 @@ fn emitters(scene: &Scene, light: &Light, term: u32) -> Vec<Emitter> {
             area,
             size2: [a, b, c].map(|p| p.distance_squared(centre)).into_iter().fold(0.0, f32::max),
             two_sided: light.flags & LIGHT_TWO_SIDED != 0,
+            reach2: if fast {
+                [strongest * area / PI, strongest * area * percent.max(0.0) * BACKSPLASH]
+            } else {
+                [f32::INFINITY; 2]
+            },
             splash: (centre + normal * (distance + 1.0), percent.max(0.0) * BACKSPLASH * area),
         });
     }
@@ -227,6 +241,9 @@ fn direct(e: &Emitter, luxel: &Luxel) -> f32 {
         return 0.0;
     }
     let d2 = to.length_squared();
+    if d2 > e.reach2[0] {
+        return 0.0;
+    }
     if d2 > FAR * FAR * e.size2 {
         let cos = luxel.cosine(to);
         return cos * (e.normal.dot(to)).abs() * e.area / (PI * d2 * d2);
@@ -243,7 +260,7 @@ fn direct(e: &Emitter, luxel: &Luxel) -> f32 {
 fn splash(e: &Emitter, luxel: &Luxel) -> f32 {
     let to = e.splash.0 - luxel.position;
     let d = to.length();
-    if d <= 0.0 {
+    if d <= 0.0 || d * d > e.reach2[1] {
         return 0.0;
     }
     e.splash.1 * luxel.cosine(to / d) / (d * d).max(NEAREST * NEAREST)
