@@ -78,7 +78,7 @@ fn debug_known() {
         println!("{name}: {} luxels, {} clamped, surfaces {}", all.len(), all.iter().filter(|l| l.clamped).count(), scene.bsp.surfaces.len());
         let some: Vec<_> = all.iter().step_by(1 + all.len() / 5000).copied().filter(|l| !l.clamped).collect();
         let occ = Occluders::new(&scene);
-        let terms = known::terms(&occ, &some, false, 1);
+        let terms = known::terms(&occ, &some, false, false, 1);
         for t in &terms { println!("  {} {:?}", t.name, t.values.iter().copied().sum::<glam::Vec3>() / some.len() as f32); }
         let sum: Vec<glam::Vec3> = (0..some.len()).map(|i| terms.iter().map(|t| t.values[i]).sum()).collect();
         println!("  mean stored {:?} {:?}", some.iter().map(|l| l.stored).sum::<glam::Vec3>() / some.len() as f32, score(&sum, &some.iter().map(|l| l.stored).collect::<Vec<_>>()));

@@ -5,7 +5,7 @@
 
 use super::luxels::Luxel;
 use super::random::Random;
-use super::visibility::{Occluders, compiled_with};
+use super::visibility::Occluders;
 use crate::reference::light_sample::{Target, sample_light};
 use crate::reference::surface::SurfaceHit;
 use crate::scene::Scene;
@@ -74,12 +74,12 @@ struct Emitter {
     reach2: [f32; 2],
 }
 
-/// Collects the terms of a scene; light entities are left out where they are `hidden`.
-pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, seed: u32) -> Vec<Term> {
+/// Collects the terms of a scene; light entities are left out where they are `hidden`, and pieces of area lights end where
+/// they give a byte if the compiler was `fast`.
+pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, fast: bool, seed: u32) -> Vec<Term> {
     let scene = occluders.scene;
     let (kinds, of_light) = kinds(scene, hidden);
     let radiance: Vec<Vec3> = kinds.iter().map(|k| term_radiance(scene, k)).collect();
-    let fast = fast(scene);
     let emitters: Vec<Vec<Emitter>> = scene
         .lights
         .lights
@@ -112,11 +112,6 @@ pub fn terms(occluders: &Occluders, receivers: &[Luxel], hidden: bool, seed: u32
             values: rows.iter().map(|r| r[k]).collect(),
         })
         .collect()
-}
-
-/// Whether the compiler ended every light where it gives a byte: with `-fast`, which nearly all recorded command lines have.
-fn fast(scene: &Scene) -> bool {
-    compiled_with(scene, "-fast") || !compiled_with(scene, "-light")
 }
 
 /// The terms in order, and the term of each light.

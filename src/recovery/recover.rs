@@ -48,7 +48,7 @@ impl Default for Options {
             test_luxels: 10_000,
             limits: Limits {
                 lights: 300,
-                candidates: 3000,
+                candidates: 2400,
                 pays: 0.0002,
             },
             hide_entities: false,
@@ -206,25 +206,41 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     timer.lap("luxels");
     let occluders = Occluders::new(scene);
     timer.lap("trees");
-    let mut terms = terms(&occluders, &luxels, options.hide_entities, options.seed);
-    timer.lap("known");
-    progress(0.1);
     let mut gathered = Gather::new(&occluders, encoding, Vec::new()).all(&luxels, options.seed);
     let dirty = compiled_with(scene, "-dirty");
     let dirt = if dirty { dirt(&occluders, &luxels) } else { vec![1.0; luxels.len()] };
-    for (i, d) in dirt.iter().enumerate() {
-        terms.iter_mut().for_each(|t| t.values[i] *= *d);
-    }
     darken(&mut gathered, &dirt);
     timer.lap("gathered");
-    progress(0.2);
+    progress(0.1);
     let fit_luxels = &luxels[..fitted];
     let mut random = Random::new(options.seed, 0x5456, 0);
     let mut rows = Rows::new(fit_luxels, (0..fitted).map(|_| random.bits() % 4 != 0).collect());
-    let mut model = Model::new(&rows);
-    for c in fixed_columns(&gathered, &dirt, &terms, 0..fitted) {
-        model.push(c, Vec3::ZERO);
-    }
+    // Whether the compiler was in a hurry stands in its command line, or else it is what explains the luxels better.
+    let hurries = match (compiled_with(scene, "-light"), compiled_with(scene, "-fast")) {
+        (true, fast) => vec![fast],
+        _ => vec![true, false],
+    };
+    let starts = hurries.into_iter().map(|fast| {
+        let mut terms = terms(&occluders, &luxels, options.hide_entities, fast, options.seed);
+        for (i, d) in dirt.iter().enumerate() {
+            terms.iter_mut().for_each(|t| t.values[i] *= *d);
+        }
+        let mut model = Model::new(&rows);
+        for c in fixed_columns(&gathered, &dirt, &terms, 0..fitted) {
+            model.push(c, Vec3::ZERO);
+        }
+        model.refit(&rows, 4, 30);
+        (terms, model)
+    });
+    let cost = |model: &Model| rows.total_cost(&model.residual);
+    let Some((terms, mut model)) = starts.min_by(|a, b| cost(&a.1).total_cmp(&cost(&b.1))) else {
+        // There is always one to choose.
+        return Err(RecoveryError::NoLightmaps {
+            map: scene.name.clone(),
+        });
+    };
+    timer.lap("known");
+    progress(0.2);
     let found;
     {
         let search = Search {
@@ -235,14 +251,14 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
             dirt: &dirt[..fitted],
         };
         let mut solver = Solver::new(&search, model, options.limits);
-        solver.run(&|share| progress(0.2 + 0.5 * share));
+        solver.run(1, &|share| progress(0.2 + 0.5 * share));
         // Clamped luxels reflect more than they show: the lights found tell how much.
         let lights = solver.found().iter().map(|f| (f.position, f.power)).collect();
         gathered = Gather::new(&occluders, encoding, lights).all(&luxels, options.seed);
         darken(&mut gathered, &dirt);
         let indirect = gathered[..fitted].iter().map(|g| g.indirect).collect();
         solver.replace_fixed(INDIRECT, tinted(indirect, 1.0));
-        solver.run(&|share| progress(0.7 + 0.25 * share));
+        solver.run(3, &|share| progress(0.7 + 0.25 * share));
         found = solver.found();
         model = solver.into_model();
     }
@@ -285,6 +301,11 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     })
 }
 
+/// A prediction as the compiler would have stored it: no channel over 1, hue kept.
+fn as_stored(value: Vec3) -> Vec3 {
+    value / value.max_element().max(1.0)
+}
+
 /// Luxels that were never fitted, with the columns of the final model there.
 struct Held<'a> {
     luxels: &'a [Luxel],
@@ -320,7 +341,7 @@ impl<'a> Held<'a> {
             .iter()
             .zip(self.luxels)
             .filter(|(_, l)| !l.clamped)
-            .map(|(p, l)| (*p, l.stored))
+            .map(|(p, l)| (as_stored(*p), l.stored))
             .unzip();
         score(&p, &s)
     }

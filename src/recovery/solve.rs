@@ -27,11 +27,9 @@ const MERGE: f32 = 72.0;
 const REDRAW: usize = 4;
 const CYCLE: usize = 6;
 /// Rounds without progress that end the search.
-const PATIENCE: usize = 4;
+const PATIENCE: usize = 3;
 /// Share of the judging cost that counts as progress.
 const PROGRESS: f64 = 0.002;
-/// Final rounds over all lights.
-const SETTLING: usize = 3;
 /// Reach of the search for a light's place when it is new and when it has settled, units.
 const NEW_RADIUS: f32 = 32.0;
 const OLD_RADIUS: f32 = 12.0;
@@ -99,8 +97,9 @@ impl<'a> Solver<'a> {
         self.model.replace(index, column, coefficient);
     }
 
-    /// Adds lights until they stop paying, then settles, merges and prunes. `progress` gets the share done, 0..1.
-    pub fn run(&mut self, progress: &(dyn Fn(f32) + Sync)) {
+    /// Adds lights until they stop paying, then settles, merges and prunes so many times. `progress` gets the share done,
+    /// 0..1.
+    pub fn run(&mut self, settling: usize, progress: &(dyn Fn(f32) + Sync)) {
         let rows = self.search.rows;
         self.model.refit(rows, 4, 30);
         let mut best = self.judged();
@@ -151,7 +150,11 @@ impl<'a> Solver<'a> {
             round += 1;
             progress(0.9 * (1.0 - (-(round as f32) / 20.0).exp()));
         }
-        self.settle();
+        for _ in 0..settling {
+            self.settle();
+        }
+        self.cycle(OLD_RADIUS);
+        self.model.refit(rows, 4, 40);
         progress(1.0);
     }
 
@@ -223,16 +226,11 @@ impl<'a> Solver<'a> {
         self.model.refit(self.search.rows, 2, 10);
     }
 
-    /// Final rounds over all lights; near ones become one, and those that don't pay go.
+    /// A round over all lights; near ones become one, and those that don't pay go.
     fn settle(&mut self) {
-        let rows = self.search.rows;
-        for _ in 0..SETTLING {
-            self.cycle(OLD_RADIUS);
-            self.merge();
-            self.prune();
-        }
         self.cycle(OLD_RADIUS);
-        self.model.refit(rows, 4, 40);
+        self.merge();
+        self.prune();
     }
 
     /// Makes one light of neighbours wherever one explains about as much.
