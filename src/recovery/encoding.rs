@@ -107,10 +107,7 @@ impl Encoding {
                 evidence: Evidence::Stated,
             };
         }
-        let kept = [LightSource::PointEntity, LightSource::SpotEntity]
-            .iter()
-            .any(|s| lights.count(*s) > 0)
-            && !worldspawn.is_some_and(|w| w.number("_keeplights").is_some_and(|n| n != 0.0));
+        let kept = lights_kept_unasked(entities, lights);
         let floor = floor_gamma(&bsp.light_grid, kept);
         let sun = sun_gamma(&bsp.light_grid, lights, compensate);
         let agree = |a: f32, b: f32| (a / b).ln().abs() < AGREEMENT;
@@ -148,6 +145,14 @@ fn snapped(gamma: f32) -> f32 {
         .filter(|u| distance(u) < NEAR_USUAL)
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))
         .unwrap_or(gamma)
+}
+
+/// Whether light entities are in the file though worldspawn did not ask for it, as id's own compiler leaves them.
+pub fn lights_kept_unasked(entities: &[Entity], lights: &LightTable) -> bool {
+    let worldspawn = entities.iter().find(|e| e.class() == "worldspawn");
+    let asked = worldspawn.is_some_and(|w| w.number("_keeplights").is_some_and(|n| n != 0.0));
+    let kept = lights.count(LightSource::PointEntity) + lights.count(LightSource::SpotEntity) > 0;
+    kept && !asked
 }
 
 /// The number after a switch of the recorded command line; the last one counts.

@@ -1,6 +1,6 @@
 //! The whole recovery of one map.
 
-use super::encoding::Encoding;
+use super::encoding::{Encoding, lights_kept_unasked};
 use super::fit::{Column, Model, Rows};
 use super::gather::{Gather, Gathered, dirt};
 use super::known::{Term, TermKind, terms};
@@ -182,6 +182,15 @@ fn darken(gathered: &mut [Gathered], dirt: &[f32]) {
     }
 }
 
+/// Whether the compiler dropped pieces of area lights that give a byte at most: `-fast`, which nearly all recorded command
+/// lines have and id's compiler (it kept the light entities unasked) does not know.
+fn hurried(scene: &Scene) -> bool {
+    if compiled_with(scene, "-light") {
+        return compiled_with(scene, "-fast");
+    }
+    !lights_kept_unasked(&scene.entities, &scene.lights)
+}
+
 /// Recovers the lights of a map. `progress` gets the share done, 0..1.
 ///
 /// # Errors
@@ -215,30 +224,14 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     let fit_luxels = &luxels[..fitted];
     let mut random = Random::new(options.seed, 0x5456, 0);
     let mut rows = Rows::new(fit_luxels, (0..fitted).map(|_| random.bits() % 4 != 0).collect());
-    // Whether the compiler was in a hurry stands in its command line, or else it is what explains the luxels better.
-    let hurries = match (compiled_with(scene, "-light"), compiled_with(scene, "-fast")) {
-        (true, fast) => vec![fast],
-        _ => vec![true, false],
-    };
-    let starts = hurries.into_iter().map(|fast| {
-        let mut terms = terms(&occluders, &luxels, options.hide_entities, fast, options.seed);
-        for (i, d) in dirt.iter().enumerate() {
-            terms.iter_mut().for_each(|t| t.values[i] *= *d);
-        }
-        let mut model = Model::new(&rows);
-        for c in fixed_columns(&gathered, &dirt, &terms, 0..fitted) {
-            model.push(c, Vec3::ZERO);
-        }
-        model.refit(&rows, 4, 30);
-        (terms, model)
-    });
-    let cost = |model: &Model| rows.total_cost(&model.residual);
-    let Some((terms, mut model)) = starts.min_by(|a, b| cost(&a.1).total_cmp(&cost(&b.1))) else {
-        // There is always one to choose.
-        return Err(RecoveryError::NoLightmaps {
-            map: scene.name.clone(),
-        });
-    };
+    let mut terms = terms(&occluders, &luxels, options.hide_entities, hurried(scene), options.seed);
+    for (i, d) in dirt.iter().enumerate() {
+        terms.iter_mut().for_each(|t| t.values[i] *= *d);
+    }
+    let mut model = Model::new(&rows);
+    for c in fixed_columns(&gathered, &dirt, &terms, 0..fitted) {
+        model.push(c, Vec3::ZERO);
+    }
     timer.lap("known");
     progress(0.2);
     let found;
