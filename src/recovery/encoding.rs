@@ -255,3 +255,72 @@ pub fn grid_direction([polar, azimuth]: [u8; 2]) -> Vec3 {
     let (sin_azimuth, cos_azimuth) = ((signed + half) * 2.0 * PI / 255.0).sin_cos();
     Vec3::new(cos_azimuth * sin_polar, sin_azimuth * sin_polar, cos_polar)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn encoding(gamma: f32, compensate: f32) -> Encoding {
+        Encoding {
+            gamma,
+            compensate,
+            evidence: Evidence::Stated,
+        }
+    }
+
+    #[test]
+    fn decoding_meets_what_was_encoded_within_a_byte() {
+        for (gamma, compensate) in [(1.0, 1.0), (1.5, 1.0), (1.3, 2.0), (2.0, 3.0), (2.25, 2.56)] {
+            let e = encoding(gamma, compensate);
+            for i in 1..200 {
+                let v = i as f32 / 200.0;
+                let [byte, ..] = e.encode(Vec3::splat(v));
+                let (least, greatest) = (e.decode_byte(byte.saturating_sub(1)), e.decode_byte(byte + 1));
+                assert!(least < v && v < greatest, "{v} at {gamma}, {compensate}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_clamp_keeps_the_hue_and_is_recognised() {
+        let e = encoding(1.0, 2.0);
+        let bytes = e.encode(Vec3::new(4.0, 2.0, 1.0));
+        assert_eq!(bytes, [127, 63, 31]);
+        assert!(e.is_clamped(bytes));
+        assert!(!e.is_clamped([120, 63, 31]));
+        assert_eq!(encoding(1.0, 3.0).clamp_byte(), 85);
+    }
+
+    #[test]
+    fn the_largest_byte_tells_the_compensation() {
+        for (largest, c) in [
+            (255, 1.0),
+            (200, 1.0),
+            (127, 2.0),
+            (85, 3.0),
+            (99, 2.563),
+            (80, 3.168),
+            (89, 2.849),
+        ] {
+            assert!((compensation(&[3, largest, 7]) - c).abs() < 1e-3, "{largest}");
+        }
+        assert_eq!(compensation(&[]), 1.0);
+    }
+
+    #[test]
+    fn command_lines_are_read_with_the_last_word_counting() {
+        let line = "-meta; -vis; -light -fast -gamma 2 -compensate 3 -gamma 1.5";
+        assert_eq!(option(line, "-gamma"), Some(1.5));
+        assert_eq!(option(line, "-Compensate"), Some(3.0));
+        assert_eq!(option(line, "-bounce"), None);
+        assert_eq!(option("-gamma", "-gamma"), None);
+    }
+
+    #[test]
+    fn grid_directions_are_unit_vectors_the_right_way_up() {
+        assert!(grid_direction([0, 0]).dot(Vec3::Z) > 0.999);
+        assert!(grid_direction([127, 0]).dot(-Vec3::Z) > 0.999);
+        assert!(grid_direction([63, 63]).dot(Vec3::Y) > 0.99);
+        assert!(grid_direction([63, 192]).dot(-Vec3::Y) > 0.99);
+    }
+}

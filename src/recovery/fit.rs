@@ -278,3 +278,106 @@ pub fn support(rows: &Rows, entries: &[Entry]) -> f32 {
     }
     if s4 > 0.0 { s2 * s2 / s4 } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(target: Vec<Vec3>, clamped: Vec<bool>) -> Rows {
+        Rows {
+            weight: vec![30.0; target.len()],
+            train: vec![true; target.len()],
+            target,
+            clamped,
+        }
+    }
+
+    fn dense(values: &[f32]) -> Column {
+        Column::Free {
+            rows: (0..values.len() as u32).collect(),
+            values: values.to_vec(),
+        }
+    }
+
+    fn values(phase: f32) -> Vec<f32> {
+        (0..40).map(|i| 0.5 + 0.5 * (i as f32 * 0.7 + phase).sin()).collect()
+    }
+
+    #[test]
+    fn overlapping_columns_are_told_apart() {
+        let (a, b) = (values(0.0), values(1.0));
+        let truth = [Vec3::new(0.2, 0.0, 0.5), Vec3::new(0.1, 0.3, 0.0)];
+        let target = a.iter().zip(&b).map(|(a, b)| truth[0] * *a + truth[1] * *b).collect();
+        let rows = rows(target, vec![false; 40]);
+        let mut model = Model::new(&rows);
+        model.push(dense(&a), Vec3::ZERO);
+        model.push(dense(&b), Vec3::ONE);
+        model.refit(&rows, 5, 300);
+        for (found, truth) in model.coefficients.iter().zip(truth) {
+            assert!(found.abs_diff_eq(truth, 5e-3), "{found} {truth}");
+        }
+    }
+
+    #[test]
+    fn nothing_becomes_negative_and_bounds_hold() {
+        let rows = rows(vec![Vec3::new(-1.0, 2.0, 0.1); 40], vec![false; 40]);
+        let mut model = Model::new(&rows);
+        model.push(dense(&values(0.0)), Vec3::ZERO);
+        model.push(
+            Column::Tinted {
+                values: vec![Vec3::splat(0.1); 40],
+                most: 1.0,
+            },
+            Vec3::ZERO,
+        );
+        model.refit(&rows, 3, 50);
+        assert_eq!(model.coefficients[0].x, 0.0);
+        assert!((0.0..=1.0).contains(&model.coefficients[1].x));
+    }
+
+    #[test]
+    fn clamped_rows_are_lower_bounds() {
+        let a = values(0.0);
+        // What is stored stops at 0.3, the light goes on.
+        let target: Vec<Vec3> = a.iter().map(|a| Vec3::splat(a.min(0.3))).collect();
+        let clamped: Vec<bool> = a.iter().map(|a| *a >= 0.3).collect();
+        let entries: Vec<Entry> = (0..40)
+            .map(|i| Entry {
+                row: i,
+                value: a[i as usize],
+                multiplicity: 1.0,
+            })
+            .collect();
+        let bounded = rows(target.clone(), clamped);
+        let (power, saved) = single(&bounded, &entries, |row| bounded.target[row]);
+        assert!(power.abs_diff_eq(Vec3::ONE, 1e-3), "{power}");
+        assert!(saved > 0.0);
+        let taken_literally = rows(target, vec![false; 40]);
+        let (power, _) = single(&taken_literally, &entries, |row| taken_literally.target[row]);
+        assert!(power.x < 0.8, "{power}");
+    }
+
+    #[test]
+    fn removing_a_column_gives_back_what_it_explained() {
+        let rows = rows(vec![Vec3::ONE; 40], vec![false; 40]);
+        let mut model = Model::new(&rows);
+        model.push(dense(&values(0.3)), Vec3::splat(0.5));
+        model.remove(0);
+        assert!(model.residual.iter().all(|r| r.abs_diff_eq(Vec3::ONE, 1e-6)));
+    }
+
+    #[test]
+    fn support_counts_the_rows_that_carry() {
+        let rows = rows(vec![Vec3::ONE; 40], vec![false; 40]);
+        let entry = |row, value| Entry {
+            row,
+            value,
+            multiplicity: 1.0,
+        };
+        let even: Vec<Entry> = (0..10).map(|r| entry(r, 1.0)).collect();
+        assert!((support(&rows, &even) - 10.0).abs() < 1e-3);
+        let lone: Vec<Entry> = (0..10).map(|r| entry(r, if r == 0 { 100.0 } else { 1.0 })).collect();
+        assert!(support(&rows, &lone) < 1.1);
+        assert_eq!(support(&rows, &[]), 0.0);
+    }
+}

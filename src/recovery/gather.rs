@@ -55,7 +55,6 @@ impl<'a> Gather<'a> {
         luxels.par_iter().enumerate().map(one).collect()
     }
 
-
     fn one(&self, luxel: &Luxel, random: &mut Random) -> Gathered {
         let (t1, t2) = tangents(luxel.normal);
         let origin = luxel.origin(luxel.normal);

@@ -123,6 +123,8 @@ fn kinds(scene: &Scene, hidden: bool) -> (Vec<TermKind>, Vec<u32>) {
         LightSource::PointEntity | LightSource::SpotEntity => (!hidden).then_some(TermKind::Entities),
         LightSource::Sun => Some(TermKind::Sun(i as u32)),
         LightSource::SkyDome => Some(TermKind::Dome(i as u32)),
+        // Lights that were recovered before are what is looked for.
+        LightSource::Recovered => None,
     };
     let mut number: BTreeMap<TermKind, u32> = (0..lights.lights.len()).filter_map(kind_of).map(|k| (k, 0)).collect();
     number.values_mut().zip(0..).for_each(|(n, i)| *n = i);
@@ -183,7 +185,10 @@ fn emitters(scene: &Scene, light: &Light, term: u32, fast: bool) -> Vec<Emitter>
             centre,
             normal,
             area,
-            size2: [a, b, c].map(|p| p.distance_squared(centre)).into_iter().fold(0.0, f32::max),
+            size2: [a, b, c]
+                .map(|p| p.distance_squared(centre))
+                .into_iter()
+                .fold(0.0, f32::max),
             two_sided: light.flags & LIGHT_TWO_SIDED != 0,
             reach2: if fast {
                 [strongest * area / PI, strongest * area * percent.max(0.0) * BACKSPLASH]
@@ -332,7 +337,11 @@ fn spread(occluders: &Occluders, luxel: &Luxel, random: &mut Random) -> Luxel {
 /// A point just before an emitter, on its side of the receiver's horizon.
 fn point_on(e: &Emitter, luxel: &Luxel, random: &mut Random) -> Option<Vec3> {
     const TRIES: usize = 4;
-    let side = if e.normal.dot(luxel.position - e.centre) < 0.0 { -1.0 } else { 1.0 };
+    let side = if e.normal.dot(luxel.position - e.centre) < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
     (0..TRIES).find_map(|_| {
         let [b1, b2] = triangle([random.unit(), random.unit()]);
         let p = e.corners[0] + (e.corners[1] - e.corners[0]) * b1 + (e.corners[2] - e.corners[0]) * b2;
@@ -364,10 +373,7 @@ fn others(occluders: &Occluders, of_light: &[u32], luxel: &Luxel, values: &mut [
             let turn = random.unit();
             for i in 0..rays {
                 // A rank-1 lattice, moved at random.
-                let u = [
-                    (i as f32 + 0.5) / rays as f32,
-                    (i as f32 * 0.618_034 + turn).fract(),
-                ];
+                let u = [(i as f32 + 0.5) / rays as f32, (i as f32 * 0.618_034 + turn).fract()];
                 let Some(sample) = sample_light(scene, light, &at, u, rays > 1) else {
                     continue;
                 };
@@ -397,5 +403,40 @@ fn receiver(luxel: &Luxel, normal: Vec3) -> SurfaceHit {
         front: true,
         cluster: luxel.cluster,
         row: luxel.cluster,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn form_factors_meet_closed_forms() {
+        // A very large ceiling fills the hemisphere: E/π = L.
+        let far = 1e5;
+        let ceiling = [
+            Vec3::new(-far, -far, 1.0),
+            Vec3::new(3.0 * far, -far, 1.0),
+            Vec3::new(-far, 3.0 * far, 1.0),
+        ];
+        assert!((form_factor(Vec3::ZERO, Vec3::Z, ceiling) - 1.0).abs() < 1e-3);
+        // A wall that begins at the receiver's floor and goes on for ever covers half of it.
+        let wall = [
+            Vec3::new(1.0, -far, -far),
+            Vec3::new(1.0, far, -far),
+            Vec3::new(1.0, 0.0, far),
+        ];
+        assert!((form_factor(Vec3::ZERO, Vec3::Z, wall) - 0.5).abs() < 2e-2);
+        // Behind the horizon there is nothing.
+        let below = ceiling.map(|p| Vec3::new(p.x, p.y, -1.0));
+        assert_eq!(form_factor(Vec3::ZERO, Vec3::Z, below), 0.0);
+        // A small distant triangle: A·cos·cos'/(π d²).
+        let small = [
+            Vec3::new(30.0, 0.0, 40.0),
+            Vec3::new(30.5, 0.0, 40.0),
+            Vec3::new(30.0, 0.5, 40.0),
+        ];
+        let expected = 0.125 * 0.8 * 0.8 / (PI * 2500.0);
+        assert!((form_factor(Vec3::ZERO, Vec3::Z, small) / expected - 1.0).abs() < 0.03);
     }
 }

@@ -140,8 +140,13 @@ impl Words<'_> {
     }
 
     fn positive(&mut self, what: &'static str) -> Result<f32, Problem> {
-        self.number(what)
-            .and_then(|x| if x > 0.0 { Ok(x) } else { Err(Problem::NotPositive(what)) })
+        self.number(what).and_then(|x| {
+            if x > 0.0 {
+                Ok(x)
+            } else {
+                Err(Problem::NotPositive(what))
+            }
+        })
     }
 
     fn colour(&mut self, what: &'static str) -> Result<Vec3, Problem> {
@@ -260,7 +265,10 @@ fn triple(v: Vec3) -> String {
 
 impl Display for LightsFile {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        writeln!(f, "# Lights that were found in the lightmaps. Values as in light entities; see the manual.")?;
+        writeln!(
+            f,
+            "# Lights that were found in the lightmaps. Values as in light entities; see the manual."
+        )?;
         if !self.map.is_empty() {
             writeln!(f, "map {}", self.map)?;
         }
@@ -274,7 +282,12 @@ impl Display for LightsFile {
             writeln!(f, "scale {name} {scale}")?;
         }
         for l in &self.lights {
-            let mut line = format!("light {} photons {} color {}", triple(l.origin), l.photons, triple(l.color));
+            let mut line = format!(
+                "light {} photons {} color {}",
+                triple(l.origin),
+                l.photons,
+                triple(l.color)
+            );
             if let Some(radius) = l.radius {
                 write!(line, " radius {radius}")?;
             }
@@ -287,5 +300,99 @@ impl Display for LightsFile {
             writeln!(f, "{line}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn full() -> LightsFile {
+        LightsFile {
+            map: "a_map".to_owned(),
+            encoding: Some(Encoding {
+                gamma: 1.3,
+                compensate: 2.0,
+                evidence: Evidence::Stated,
+            }),
+            ambient: Vec3::new(0.01, 0.02, 1.0 / 3.0),
+            sky: Vec3::new(0.0, 0.25, 1e-7),
+            indirect: 0.75,
+            scales: vec![("textures/a/b".to_owned(), 0.93), ("sun:4".to_owned(), 0.0)],
+            lights: vec![
+                FileLight {
+                    origin: Vec3::new(-1.5, 1e5, 0.1),
+                    photons: 312.7,
+                    color: Vec3::new(1.0, 0.9, 1.0 / 3.0),
+                    radius: None,
+                    spot: None,
+                    share: None,
+                },
+                FileLight {
+                    origin: Vec3::ZERO,
+                    photons: -20.0,
+                    color: Vec3::ONE,
+                    radius: Some(8.0),
+                    spot: Some(Spot {
+                        target: Vec3::new(1.0, 2.0, 3.0),
+                        cone: 32.0,
+                    }),
+                    share: None,
+                },
+            ],
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let file = full();
+        assert_eq!(LightsFile::parse(&file.to_string()), Ok(file));
+    }
+
+    #[test]
+    fn shares_survive_as_comments() {
+        let mut file = full();
+        file.lights[0].share = Some(0.125);
+        let read = LightsFile::parse(&file.to_string()).map(|f| f.lights[0].share);
+        assert_eq!(read, Ok(Some(0.125)));
+    }
+
+    #[test]
+    fn people_may_leave_things_out() {
+        let text = "\n  # only a light\nlight 1 2 3 # here\nlight 4 5 6 target 0 0 0\n";
+        let Ok(file) = LightsFile::parse(text) else {
+            panic!("not read");
+        };
+        assert_eq!(file.lights.len(), 2);
+        assert_eq!((file.lights[0].photons, file.lights[0].color), (300.0, Vec3::ONE));
+        assert_eq!(file.lights[1].spot.map(|s| s.cone), Some(64.0));
+    }
+
+    #[test]
+    fn errors_name_line_and_fault() {
+        let fault = |text: &str| LightsFile::parse(text).map_err(|e| (e.line, e.problem));
+        let numbers = |what, wanted| Problem::Numbers { what, wanted };
+        for (text, line, problem) in [
+            ("map a\nlamp 1 2 3", 2, Problem::Unknown("lamp".to_owned())),
+            ("light 1 2", 1, numbers("light", 3)),
+            ("light 1 2 nan", 1, numbers("light", 3)),
+            ("light 1 2 3 color 1 -1 0", 1, Problem::Negative("color")),
+            ("light 1 2 3 radius 0", 1, Problem::NotPositive("radius")),
+            ("light 1 2 3 cone 64", 1, Problem::ConeWithoutTarget),
+            ("light 1 2 3 colour 1 1 1", 1, Problem::Unknown("colour".to_owned())),
+            ("\n\nscale", 3, Problem::Name("scale")),
+            ("scale x -1", 1, Problem::Negative("scale")),
+            ("indirect much", 1, numbers("indirect", 1)),
+            ("ambient 1 2 3 4", 1, Problem::Unknown("4".to_owned())),
+            ("encoding gamma 0", 1, Problem::NotPositive("gamma")),
+        ] {
+            assert_eq!(fault(text), Err((line, problem)), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn the_path_is_beside_the_map() {
+        assert_eq!(path("Oa_Dm1"), "maps/oa_dm1.lights");
+        assert_eq!(path("maps/x.bsp"), "maps/x.lights");
     }
 }

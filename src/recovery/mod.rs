@@ -7,16 +7,19 @@
 //!
 //! Everything runs on the CPU, in parallel, and gives the same result for the same seed.
 
+pub mod cache;
 pub mod candidates;
 pub mod encoding;
 pub mod fit;
 pub mod gather;
 pub mod known;
 pub mod lights_file;
+pub mod luxel_table;
 pub mod luxels;
 pub mod point;
 pub mod random;
 pub mod recover;
+pub mod scene_lights;
 pub mod score;
 pub mod solve;
 pub mod visibility;

@@ -136,14 +136,26 @@ fn sample(all: &[Luxel], options: &Options) -> (Vec<Luxel>, usize) {
         taken.iter_mut().zip(&held).for_each(|(t, h)| *t = !h);
     }
     let area = |l: &Luxel| l.area;
-    let tested = choose(all, options.test_luxels.min(all.len() / 3), area, &mut taken, &mut random);
+    let tested = choose(
+        all,
+        options.test_luxels.min(all.len() / 3),
+        area,
+        &mut taken,
+        &mut random,
+    );
     if options.hold_out_surfaces {
         taken.clone_from(&held);
     }
     let by_area = (options.fit_luxels as f32 * BY_AREA) as usize;
     let bright = |l: &Luxel| l.area * l.stored.max_element().min(BRIGHTEST);
     let mut fitted = choose(all, by_area, area, &mut taken, &mut random);
-    fitted.extend(choose(all, options.fit_luxels - by_area, bright, &mut taken, &mut random));
+    fitted.extend(choose(
+        all,
+        options.fit_luxels - by_area,
+        bright,
+        &mut taken,
+        &mut random,
+    ));
     let count = fitted.len();
     (fitted.into_iter().chain(tested).map(|i| all[i]).collect(), count)
 }
@@ -217,7 +229,11 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     timer.lap("trees");
     let mut gathered = Gather::new(&occluders, encoding, Vec::new()).all(&luxels, options.seed);
     let dirty = compiled_with(scene, "-dirty");
-    let dirt = if dirty { dirt(&occluders, &luxels) } else { vec![1.0; luxels.len()] };
+    let dirt = if dirty {
+        dirt(&occluders, &luxels)
+    } else {
+        vec![1.0; luxels.len()]
+    };
     darken(&mut gathered, &dirt);
     timer.lap("gathered");
     progress(0.1);
@@ -278,7 +294,13 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
         })
         .collect();
     let mut rows_out = luxel_rows(fit_luxels, &model.columns, &model.coefficients, terms.len(), false);
-    rows_out.extend(luxel_rows(&luxels[fitted..], &held.columns, &model.coefficients, terms.len(), true));
+    rows_out.extend(luxel_rows(
+        &luxels[fitted..],
+        &held.columns,
+        &model.coefficients,
+        terms.len(),
+        true,
+    ));
     progress(1.0);
     Ok(Recovery {
         map: scene.name.clone(),
@@ -317,7 +339,10 @@ impl<'a> Held<'a> {
             .par_iter()
             .map(|f| {
                 let (rows, mut values) = column(occluders, luxels, f.position, reach(f.power));
-                values.iter_mut().zip(&rows).for_each(|(v, row)| *v *= dirt[*row as usize]);
+                values
+                    .iter_mut()
+                    .zip(&rows)
+                    .for_each(|(v, row)| *v *= dirt[*row as usize]);
                 Column::Free { rows, values }
             })
             .collect();
@@ -366,7 +391,9 @@ impl<'a> Held<'a> {
             luxels: self.luxels.iter().filter(|l| !l.clamped).count(),
             known: self.score(&only(&ones, &known)),
             known_scaled: self.score(&refit(&|i| lights.contains(&i))),
-            direct: self.score(&only(&model.coefficients, &|i| known(i) || i == SKY || lights.contains(&i))),
+            direct: self.score(&only(&model.coefficients, &|i| {
+                known(i) || i == SKY || lights.contains(&i)
+            })),
             without_indirect: self.score(&refit(&|i| i == INDIRECT)),
             full: self.score(&model.coefficients),
         }

@@ -59,3 +59,20 @@ pub struct Scores {
     /// Everything: known and recovered lights, ambient and gathered light.
     pub full: Score,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_of_known_cases() {
+        let stored: Vec<Vec3> = (1..50).map(|i| Vec3::splat(i as f32)).collect();
+        let twice: Vec<Vec3> = stored.iter().map(|s| *s * 2.0).collect();
+        let s = score(&twice, &stored);
+        assert!((s.correlation - 1.0).abs() < 1e-9 && (s.ratio - 2.0).abs() < 1e-6);
+        let opposite: Vec<Vec3> = stored.iter().map(|s| Vec3::splat(60.0) - *s).collect();
+        assert!((score(&opposite, &stored).correlation + 1.0).abs() < 1e-9);
+        assert_eq!(score(&[], &[]).correlation, 0.0);
+        assert_eq!(score(&stored, &vec![Vec3::ONE; stored.len()]).correlation, 0.0);
+    }
+}

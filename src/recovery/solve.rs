@@ -213,7 +213,10 @@ impl<'a> Solver<'a> {
                     let label = self.label * 1024 + i as u32;
                     let placed = self.search.refine(self.places[i], radius, label, residual);
                     let changed = placed.position != self.places[i] && placed.gain > 0.0;
-                    (i, changed.then(|| (placed, self.search.column(placed.position, placed.power))))
+                    (
+                        i,
+                        changed.then(|| (placed, self.search.column(placed.position, placed.power))),
+                    )
                 })
                 .collect();
             for (i, change) in moved {
@@ -283,7 +286,14 @@ impl<'a> Solver<'a> {
         if rows.total_cost(&residual) > before + self.least {
             return false;
         }
-        self.model.replace(b, Column::Free { rows: Vec::new(), values: Vec::new() }, Vec3::ZERO);
+        self.model.replace(
+            b,
+            Column::Free {
+                rows: Vec::new(),
+                values: Vec::new(),
+            },
+            Vec3::ZERO,
+        );
         self.model.replace(a, column, placed.power);
         self.places[i] = placed.position;
         true

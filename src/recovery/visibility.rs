@@ -35,7 +35,12 @@ impl<'a> Occluders<'a> {
     pub fn places(&self, luxel: &Luxel) -> impl Iterator<Item = Luxel> {
         const SPREAD: f32 = std::f32::consts::FRAC_1_SQRT_2;
         let spread = if self.filtered { SPREAD } else { 0.0 };
-        let around = [(-spread, -spread), (spread, -spread), (-spread, spread), (spread, spread)];
+        let around = [
+            (-spread, -spread),
+            (spread, -spread),
+            (-spread, spread),
+            (spread, spread),
+        ];
         let luxel = *luxel;
         around
             .into_iter()
