@@ -153,7 +153,10 @@ impl<'a> Solver<'a> {
         for _ in 0..settling {
             self.settle();
         }
-        self.cycle(OLD_RADIUS);
+        if settling > 1 {
+            self.merge_with_neighbours();
+            self.polish();
+        }
         self.model.refit(rows, 4, 40);
         progress(1.0);
     }
@@ -188,8 +191,12 @@ impl<'a> Solver<'a> {
 
     /// Moves every light to its best place given the others, those far apart at once.
     fn cycle(&mut self, radius: f32) {
+        self.cycle_over((0..self.places.len()).collect(), radius);
+    }
+
+    /// The same for some lights.
+    fn cycle_over(&mut self, mut waiting: Vec<usize>, radius: f32) {
         const INDEPENDENT: f32 = 400.0;
-        let mut waiting: Vec<usize> = (0..self.places.len()).collect();
         self.label += 1;
         while !waiting.is_empty() {
             let mut batch: Vec<usize> = Vec::new();
@@ -236,6 +243,21 @@ impl<'a> Solver<'a> {
         self.prune();
     }
 
+    /// Rounds over all lights until they stand still: neighbours share what both reach, and only agree step by step.
+    fn polish(&mut self) {
+        const ROUNDS: usize = 12;
+        const STILL: f64 = 1e-3;
+        let mut cost = self.search.rows.total_cost(&self.model.residual);
+        for round in 0..ROUNDS {
+            self.cycle(OLD_RADIUS / (1 + round / 3) as f32);
+            let now = self.search.rows.total_cost(&self.model.residual);
+            if now > cost * (1.0 - STILL) {
+                break;
+            }
+            cost = now;
+        }
+    }
+
     /// Makes one light of neighbours wherever one explains about as much.
     fn merge(&mut self) {
         let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
@@ -259,6 +281,47 @@ impl<'a> Solver<'a> {
             self.places.remove(j);
         }
         self.model.refit(self.search.rows, 2, 15);
+    }
+
+    /// Tries one light for two where their neighbours must give way for it to do, the nearest pairs first.
+    fn merge_with_neighbours(&mut self) {
+        const REACH: f32 = 96.0;
+        const NEIGHBOURS: f32 = 300.0;
+        const TRIALS: usize = 24;
+        const ROUNDS: usize = 3;
+        let rows = self.search.rows;
+        let mut refused: Vec<(Vec3, Vec3)> = Vec::new();
+        for _ in 0..TRIALS {
+            let mut nearest: Option<(f32, usize, usize)> = None;
+            for i in 0..self.places.len() {
+                for j in i + 1..self.places.len() {
+                    let d = self.places[i].distance(self.places[j]);
+                    let tried = refused.contains(&(self.places[i], self.places[j]));
+                    if d < REACH && !tried && nearest.is_none_or(|(n, ..)| d < n) {
+                        nearest = Some((d, i, j));
+                    }
+                }
+            }
+            let Some((_, i, j)) = nearest else { return };
+            let before = rows.total_cost(&self.model.residual);
+            let kept = (self.model.clone(), self.places.clone());
+            // The weaker one goes; all around it move to fill its place.
+            let power = |k: usize| self.model.coefficients[self.fixed + k].element_sum();
+            let weaker = if power(i) < power(j) { i } else { j };
+            let around = self.places[weaker];
+            self.model.remove(self.fixed + weaker);
+            self.places.remove(weaker);
+            let near = |k: &usize| self.places[*k].distance(around) < NEIGHBOURS;
+            let neighbours: Vec<usize> = (0..self.places.len()).filter(near).collect();
+            self.model.refit(rows, 1, 15);
+            for _ in 0..ROUNDS {
+                self.cycle_over(neighbours.clone(), OLD_RADIUS);
+            }
+            if rows.total_cost(&self.model.residual) > before + self.least {
+                refused.push((kept.1[i], kept.1[j]));
+                (self.model, self.places) = kept;
+            }
+        }
     }
 
     /// Tries one light for two; where that is good enough the second is left without power.
