@@ -224,5 +224,5 @@ pub fn choose(
 
 /// Whether a surface belongs to the third (by number, chosen by hash) that can be held out as a whole.
 pub fn held_out_surface(surface: u32, seed: u32) -> bool {
-    crate::scene::sampling::key(seed, surface, 0x5f) % 3 == 0
+    crate::scene::sampling::key(seed, surface, 0x5f).is_multiple_of(3)
 }

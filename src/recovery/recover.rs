@@ -239,7 +239,10 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     progress(0.1);
     let fit_luxels = &luxels[..fitted];
     let mut random = Random::new(options.seed, 0x5456, 0);
-    let mut rows = Rows::new(fit_luxels, (0..fitted).map(|_| random.bits() % 4 != 0).collect());
+    let mut rows = Rows::new(
+        fit_luxels,
+        (0..fitted).map(|_| !random.bits().is_multiple_of(4)).collect(),
+    );
     let mut terms = terms(&occluders, &luxels, options.hide_entities, hurried(scene), options.seed);
     for (i, d) in dirt.iter().enumerate() {
         terms.iter_mut().for_each(|t| t.values[i] *= *d);
