@@ -1,7 +1,7 @@
 //! What arrives from other surfaces and from the sky, gathered once from the stored light itself.
 
+use super::emitter::NEAREST;
 use super::encoding::Encoding;
-use super::known::NEAREST;
 use super::luxels::{Luxel, SAMPLE_OFFSET};
 use super::point::POINT;
 use super::random::Random;

@@ -9,13 +9,16 @@
 
 pub mod cache;
 pub mod candidates;
+pub mod emitter;
 pub mod encoding;
 pub mod fit;
 pub mod gather;
+pub mod held_out;
 pub mod known;
 pub mod lights_file;
 pub mod luxel_table;
 pub mod luxels;
+pub mod merge;
 pub mod point;
 pub mod random;
 pub mod recover;

@@ -10,7 +10,7 @@ use glam::Vec3;
 /// Irradiance/π of a light of 1 photon at distance 1, luxel units.
 pub const POINT: f32 = 7500.0 / 255.0;
 /// No light is nearer than this, units.
-const NEAREST2: f32 = super::known::NEAREST * super::known::NEAREST;
+const NEAREST2: f32 = super::emitter::NEAREST * super::emitter::NEAREST;
 /// Below this irradiance at power 1 even the strongest lamp leaves no trace.
 const FAINT: f32 = 2e-6;
 
@@ -91,7 +91,7 @@ impl Search<'_> {
                 }
                 cosine = cosine.max(LOOSE_COSINE);
             }
-            let near = (d - slack).max(super::known::NEAREST);
+            let near = (d - slack).max(super::emitter::NEAREST);
             let importance = self.rows.weight[row] * cosine / (near * near);
             if importance > 0.0 {
                 total += importance;

@@ -3,16 +3,16 @@
 use super::encoding::{Encoding, lights_kept_unasked};
 use super::fit::{Column, Model, Rows};
 use super::gather::{Gather, Gathered, dirt};
+use super::held_out::HeldOut;
 use super::known::{Term, TermKind, terms};
 use super::luxels::{self, Luxel, choose, held_out_surface};
-use super::point::{Search, column, reach};
+use super::point::Search;
 use super::random::Random;
-use super::score::{Score, Scores, score};
+use super::score::Scores;
 use super::solve::{Found, Limits, Solver};
 use super::visibility::{Occluders, compiled_with};
 use crate::scene::Scene;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -110,10 +110,10 @@ pub struct Recovery {
 }
 
 /// Columns before the known terms.
-const AMBIENT: usize = 0;
-const INDIRECT: usize = 1;
-const SKY: usize = 2;
-const FIRST_TERM: usize = 3;
+pub(super) const AMBIENT: usize = 0;
+pub(super) const INDIRECT: usize = 1;
+pub(super) const SKY: usize = 2;
+pub(super) const FIRST_TERM: usize = 3;
 
 struct Timer(Instant, Vec<(&'static str, Duration)>);
 
@@ -277,7 +277,7 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     timer.lap("search");
     rows.train.fill(true);
     model.refit(&rows, 4, 40);
-    let held = Held::new(&occluders, &luxels[fitted..], &dirt[fitted..], &found, {
+    let held = HeldOut::new(&occluders, &luxels[fitted..], &dirt[fitted..], &found, {
         fixed_columns(&gathered, &dirt, &terms, fitted..luxels.len())
     });
     let scores = held.scores(&rows, &model, terms.len());
@@ -317,90 +317,6 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
         luxels: rows_out,
         timings: timer.1,
     })
-}
-
-/// A prediction as the compiler would have stored it: no channel over 1, hue kept.
-fn as_stored(value: Vec3) -> Vec3 {
-    value / value.max_element().max(1.0)
-}
-
-/// Luxels that were never fitted, with the columns of the final model there.
-struct Held<'a> {
-    luxels: &'a [Luxel],
-    columns: Vec<Column>,
-}
-
-impl<'a> Held<'a> {
-    fn new(
-        occluders: &Occluders,
-        luxels: &'a [Luxel],
-        dirt: &[f32],
-        found: &[Found],
-        mut columns: Vec<Column>,
-    ) -> Self {
-        let lights: Vec<Column> = found
-            .par_iter()
-            .map(|f| {
-                let (rows, mut values) = column(occluders, luxels, f.position, reach(f.power));
-                values
-                    .iter_mut()
-                    .zip(&rows)
-                    .for_each(|(v, row)| *v *= dirt[*row as usize]);
-                Column::Free { rows, values }
-            })
-            .collect();
-        columns.extend(lights);
-        Self { luxels, columns }
-    }
-
-    fn score(&self, coefficients: &[Vec3]) -> Score {
-        let mut predicted = vec![Vec3::ZERO; self.luxels.len()];
-        for (column, c) in self.columns.iter().zip(coefficients) {
-            column.add_to(&mut predicted, *c);
-        }
-        let (p, s): (Vec<Vec3>, Vec<Vec3>) = predicted
-            .iter()
-            .zip(self.luxels)
-            .filter(|(_, l)| !l.clamped)
-            .map(|(p, l)| (as_stored(*p), l.stored))
-            .unzip();
-        score(&p, &s)
-    }
-
-    fn scores(&self, rows: &Rows, model: &Model, terms: usize) -> Scores {
-        let lights = FIRST_TERM + terms..model.columns.len();
-        let only = |coefficients: &[Vec3], keep: &dyn Fn(usize) -> bool| -> Vec<Vec3> {
-            let pick = |(i, c): (usize, &Vec3)| if keep(i) { *c } else { Vec3::ZERO };
-            coefficients.iter().enumerate().map(pick).collect()
-        };
-        let known = |i: usize| (FIRST_TERM..FIRST_TERM + terms).contains(&i);
-        let ones = vec![Vec3::ONE; model.columns.len()];
-        let refit = |drop: &dyn Fn(usize) -> bool| -> Vec<Vec3> {
-            let mut model = model.clone();
-            for (i, column) in model.columns.iter_mut().enumerate() {
-                if drop(i) {
-                    column.add_to(&mut model.residual, model.coefficients[i]);
-                    *column = Column::Free {
-                        rows: Vec::new(),
-                        values: Vec::new(),
-                    };
-                    model.coefficients[i] = Vec3::ZERO;
-                }
-            }
-            model.refit(rows, 4, 40);
-            model.coefficients
-        };
-        Scores {
-            luxels: self.luxels.iter().filter(|l| !l.clamped).count(),
-            known: self.score(&only(&ones, &known)),
-            known_scaled: self.score(&refit(&|i| lights.contains(&i))),
-            direct: self.score(&only(&model.coefficients, &|i| {
-                known(i) || i == SKY || lights.contains(&i)
-            })),
-            without_indirect: self.score(&refit(&|i| i == INDIRECT)),
-            full: self.score(&model.coefficients),
-        }
-    }
 }
 
 fn luxel_rows(
