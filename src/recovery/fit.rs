@@ -241,12 +241,16 @@ pub struct Entry {
 
 /// The best non-negative power (per channel) of a single light against a residual, and the cost that it saves.
 pub fn single(rows: &Rows, entries: &[Entry], residual: impl Fn(usize) -> Vec3) -> (Vec3, f32) {
-    const PASSES: usize = 3;
+    const PASSES: usize = 4;
     let mut power = Vec3::ZERO;
-    for _ in 0..PASSES {
+    for pass in 0..PASSES {
         let (mut slope, mut curvature) = (Vec3::ZERO, Vec3::ZERO);
         for e in entries {
             let row = e.row as usize;
+            // Bounds have their say about a power that the others suggest: at no power at all every bound pulls it down.
+            if pass == 0 && rows.clamped[row] {
+                continue;
+            }
             let r = residual(row);
             let q = rows.robust_weights(row, r - power * e.value) * (e.multiplicity * e.value);
             slope += q * r;
