@@ -243,11 +243,11 @@ impl<'a> Solver<'a> {
 
     /// Rounds over all lights until they stand still: neighbours share what both reach, and only agree step by step.
     fn polish(&mut self) {
-        const ROUNDS: usize = 12;
-        const STILL: f64 = 1e-3;
+        const ROUNDS: usize = 18;
+        const STILL: f64 = 2e-4;
         let mut cost = self.search.rows.total_cost(&self.model.residual);
         for round in 0..ROUNDS {
-            self.cycle(OLD_RADIUS / (1 + round / 3) as f32);
+            self.cycle(OLD_RADIUS / (1 + round / 6) as f32);
             let now = self.search.rows.total_cost(&self.model.residual);
             if now > cost * (1.0 - STILL) {
                 break;
