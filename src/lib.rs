@@ -13,6 +13,7 @@ pub mod engine;
 pub mod gpu;
 pub mod metrics;
 pub mod output;
+pub mod recovery;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -1,6 +1,6 @@
 //! Arguments: sub-commands by `clap`, and Quake's `+set NAME VALUE` and `+COMMAND` anywhere.
 
-use super::{bench, common::Common, compare, info, maps, merge, play, render};
+use super::{bench, common::Common, compare, info, lights, maps, merge, play, render};
 use crate::console::Cvars;
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
@@ -51,6 +51,8 @@ enum Command {
     Render(render::Args),
     /// Describe a map
     Info(info::Args),
+    /// Find the lights that a map's compiler threw away
+    Lights(lights::Args),
     /// List the maps found, and where
     Maps(maps::Args),
     /// Measure speed
@@ -135,6 +137,7 @@ fn dispatch() -> CliResult {
     match cli.command {
         Some(Command::Render(args)) => render::run(&cli.common, cvars, args),
         Some(Command::Info(args)) => info::run(&cli.common, &args),
+        Some(Command::Lights(args)) => lights::run(&cli.common, cvars.number("rt_seed") as u32, &args),
         Some(Command::Maps(args)) => maps::run(&cli.common, &args),
         Some(Command::Bench(args)) => bench::run(&cli.common, &cvars, &args),
         Some(Command::Compare(args)) => compare::run(&args),

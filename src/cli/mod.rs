@@ -5,6 +5,7 @@ mod bench;
 mod common;
 mod compare;
 mod info;
+mod lights;
 mod maps;
 mod merge;
 mod play;

@@ -37,6 +37,8 @@ pub enum LightSource {
     EmissiveSprite,
     Sun,
     SkyDome,
+    /// Found in the lightmaps, or in a lights file.
+    Recovered,
 }
 
 /// All lights of a scene: the records, where each came from, and where it can act.
@@ -79,7 +81,8 @@ pub struct LightInputs<'a> {
 }
 
 impl LightTable {
-    fn push(&mut self, source: LightSource, light: Light, reach: LightReach) {
+    /// Appends a light.
+    pub fn push(&mut self, source: LightSource, light: Light, reach: LightReach) {
         self.lights.push(light);
         self.sources.push(source);
         self.reach.push(reach);

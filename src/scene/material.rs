@@ -21,6 +21,12 @@ const SKY_SIDES: [&str; 6] = ["rt", "lf", "bk", "ft", "up", "dn"];
 /// 64, its display's unit.
 const UNLIT_SKY: f32 = 64.0 / 255.0;
 
+/// The compiler's `q3map_backsplash` where a script has none.
+const BACKSPLASH: [f32; 2] = [5.0, 23.0];
+
+/// The compiler's `q3map_lightSubdivide` where a script has none.
+const LIGHT_SUBDIVIDE: f32 = 999.0;
+
 /// Decoded means below this in any channel belong to night skies.
 const DARK_SKY: f32 = 0.02;
 
@@ -63,6 +69,11 @@ pub struct MaterialSource {
     pub suns: Vec<Sun>,
     /// `q3map_skylight`: intensity in byte units.
     pub sky_light: Option<f32>,
+    /// `q3map_backsplash`: percent of the emitted light that the compiler throws back at the mounting, and from how far in
+    /// front of it, units.
+    pub backsplash: [f32; 2],
+    /// `q3map_lightSubdivide`: greatest extent of one emitting piece, units.
+    pub light_subdivide: f32,
     /// Images that give the emitted colour, the first that loads.
     colour_images: Vec<u32>,
     /// `q3map_lightRGB`.
@@ -147,6 +158,8 @@ impl MaterialSource {
                 emission: None,
                 suns: Vec::new(),
                 sky_light: None,
+                backsplash: BACKSPLASH,
+                light_subdivide: LIGHT_SUBDIVIDE,
                 colour_images: Vec::new(),
                 colour_rgb: None,
                 colour: Vec3::ONE,
@@ -189,6 +202,15 @@ impl MaterialSource {
                 Vec::new()
             },
             sky_light,
+            backsplash: shader
+                .compiler
+                .backsplash
+                .map_or(BACKSPLASH, |b| [b.percent, b.distance]),
+            light_subdivide: shader
+                .compiler
+                .light_subdivide
+                .filter(|s| *s > 0.0)
+                .unwrap_or(LIGHT_SUBDIVIDE),
             colour_rgb,
             colour: Vec3::ONE,
         }

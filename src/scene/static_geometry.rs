@@ -44,6 +44,8 @@ pub struct Geometry {
     /// Object-space positions, units.
     pub positions: Vec<[f32; 3]>,
     pub attributes: Vec<VertexAttributes>,
+    /// Lightmap coordinates of each vertex, 0..1 of its surface's page; only the CPU looks at them.
+    pub lightmap_uvs: Vec<[f32; 2]>,
     pub triangles: Vec<Triangle>,
     /// `meshes[i]` is the map's model i; model 0 is the world.
     pub meshes: Vec<Mesh>,
@@ -170,6 +172,7 @@ impl Geometry {
         let base = self.positions.len() as u32;
         for v in &mesh.vertices {
             self.positions.push(v.position.into());
+            self.lightmap_uvs.push(v.lightmap_uv.into());
             let color = v.color.to_array().map(|c| (c * 255.0 + 0.5).clamp(0.0, 255.0) as u8);
             self.attributes.push(VertexAttributes {
                 normal: v.normal.into(),
