@@ -7,6 +7,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "prelude.glsl"
 #include "gbuffer.glsl"
+#include "ambient.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -23,7 +24,11 @@ void main() {
     if (any(greaterThanEqual(pixel, FC.size))) return;
     ivec2 p = ivec2(pixel);
     vec4 albedo = imageLoad(gbuffer_albedo, p);
-    vec3 direct = albedo.rgb * imageLoad(image_direct, p).rgb;
+    vec3 irradiance = imageLoad(image_direct, p).rgb;
+    if (FC.illumination != 0 && FC.ambient != AMBIENT_OFF && albedo.rgb != vec3(0.0)) {
+        irradiance += ambient_at(imageLoad(gbuffer_position, p).xyz, unpack_normal(imageLoad(gbuffer_surface, p).x));
+    }
+    vec3 direct = albedo.rgb * irradiance;
     vec3 emission = imageLoad(image_emission, p).rgb;
     if (FC.illumination == 0 && albedo.rgb != vec3(0.0)) emission = vec3(0.0);
     vec3 radiance = direct + emission;

@@ -9,21 +9,11 @@
 #include "surface.glsl"
 #include "light_sample.glsl"
 #include "light_choice.glsl"
+#include "visibility.glsl"
+#include "ray_counts.glsl"
 #include "gbuffer.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-shared uint shadow_rays;
-shared uint shadow_skipped;
-
-bool visible(SurfaceHit at, LightSample s) {
-    vec3 origin = offset_point(at.position, at.geometric_normal);
-    // One closest-hit walk would serve both; any-hit ends sooner for the many finite lights.
-    if (!s.sky) return !trace_any(origin, s.target - origin, 1.0);
-    Hit hit = trace_closest(origin, s.target, RAY_FAR);
-    if (hit.triangle == NONE) return false;
-    return (FC.materials.at[FC.triangles.at[hit.triangle].material].flags & MATERIAL_SKY) != 0;
-}
 
 uvec2 random_bits(uint address, uint dimension) {
     return bits2(FC.sequence, random_key(FC.seed, address, dimension), sample_index);
@@ -32,7 +22,7 @@ uvec2 random_bits(uint address, uint dimension) {
 LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at) {
     uvec2 bits = random_bits(address, dimension);
     vec2 u = vec2(unit_float(bits.x), unit_float(bits.y));
-    return sample_light(FC.lights.at[light], at, u, FC.soft_shadows != 0);
+    return sample_light(FC.lights.at[light], at, u, point_sampling());
 }
 
 vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
@@ -41,18 +31,18 @@ vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
         return vec3(0.0);
     }
     counts.x++;
-    return visible(at, s) ? s.value : vec3(0.0);
+    return visible(offset_point(at.position, at.geometric_normal), s) ? s.value : vec3(0.0);
 }
 
 // One light resampled from candidates in proportion to what they give without visibility.
-vec3 resampled(LightRow row, uint i, uint address, SurfaceHit at, inout uvec2 counts) {
+vec3 resampled(Chances chances, uint i, uint address, SurfaceHit at, inout uvec2 counts) {
     uint n = clamp(FC.light_candidates, 1, MAX_CANDIDATES);
     LightSample kept = LightSample(vec3(0.0), vec3(0.0), false);
     float kept_target = 0.0;
     float sum = 0.0;
     [[dont_unroll]] for (uint c = i * MAX_CANDIDATES; c < i * MAX_CANDIDATES + n; c++) {
         uvec2 bits = random_bits(address, DIM_CANDIDATE_PICK + c);
-        Choice choice = choose_light(FC.light_sampling, row, at, bits.x);
+        Choice choice = choose_light(chances, at, bits.x);
         if (choice.light == NONE) continue;
         LightSample s = sampled(choice.light, DIM_CANDIDATE_POINT + c, address, at);
         float target = luminance(s.value);
@@ -69,7 +59,8 @@ vec3 resampled(LightRow row, uint i, uint address, SurfaceHit at, inout uvec2 co
 }
 
 vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
-    LightRow row = FC.light_rows.at[FC.cull_lights == 0 ? FC.all_row : at.row];
+    Chances chances = chances_at(at);
+    LightRow row = chances.row;
     vec3 sum = vec3(0.0);
     if (FC.random_lights == 0) {
         [[dont_unroll]] for (uint r = 0; r < row.run_count; r++) {
@@ -83,10 +74,10 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     float share = 1.0 / float(FC.random_lights);
     [[dont_unroll]] for (uint i = 0; i < FC.random_lights; i++) {
         if (FC.light_sampling == SAMPLING_RESERVOIR) {
-            sum += resampled(row, i, address, at, counts) * share;
+            sum += resampled(chances, i, address, at, counts) * share;
             continue;
         }
-        Choice choice = choose_light(FC.light_sampling, row, at, random_bits(address, DIM_LIGHT_PICK + i).x);
+        Choice choice = choose_light(chances, at, random_bits(address, DIM_LIGHT_PICK + i).x);
         if (choice.light == NONE) continue;
         LightSample s = sampled(choice.light, DIM_LIGHT_POINT + i, address, at);
         sum += traced(s, at, counts) * (share / choice.probability);
@@ -94,18 +85,8 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     return sum;
 }
 
-// Adds to a 64-bit counter made of two words.
-void count(uint counter, uint amount) {
-    uint before = atomicAdd(FC.counters.at[counter * 2], amount);
-    if (before + amount < before) atomicAdd(FC.counters.at[counter * 2 + 1], 1);
-}
-
 void main() {
-    if (gl_LocalInvocationIndex == 0) {
-        shadow_rays = 0;
-        shadow_skipped = 0;
-    }
-    barrier();
+    begin_counting();
     uvec2 pixel = gl_GlobalInvocationID.xy;
     uvec2 counts = uvec2(0);
     if (all(lessThan(pixel, FC.size))) {
@@ -124,11 +105,5 @@ void main() {
         }
         imageStore(image_direct, p, vec4(irradiance, 0.0));
     }
-    if (counts.x != 0) atomicAdd(shadow_rays, counts.x);
-    if (counts.y != 0) atomicAdd(shadow_skipped, counts.y);
-    barrier();
-    if (gl_LocalInvocationIndex == 0) {
-        if (shadow_rays != 0) count(0, shadow_rays);
-        if (shadow_skipped != 0) count(1, shadow_skipped);
-    }
+    end_counting(counts);
 }

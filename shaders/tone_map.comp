@@ -5,6 +5,7 @@
 #include "random.glsl"
 #include "gbuffer.glsl"
 #include "tonemap.glsl"
+#include "ambient.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -24,6 +25,9 @@ void main() {
                                     : imageLoad(image_composite, p).rgb;
     if (FC.view == 8) radiance = imageLoad(image_direct, p).rgb;
     if (FC.view == 9) radiance = imageLoad(image_emission, p).rgb;
+    if (FC.view == 10) {
+        radiance = ambient_at(imageLoad(gbuffer_position, p).xyz, unpack_normal(imageLoad(gbuffer_surface, p).x));
+    }
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
     vec3 shown = encode_srgb(clamp(tone_map(clamp(radiance * exposure, vec3(0.0), vec3(1e4)), FC.tonemap), vec3(0.0), vec3(1.0)));
     uvec4 surface = imageLoad(gbuffer_surface, p);

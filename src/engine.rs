@@ -109,6 +109,14 @@ pub fn describe(device: &Device, backend: Backend, choice: BackendChoice) -> Str
 }
 
 impl Engine {
+    /// Whether it is a CPU that traces, by itself or behind a Vulkan driver.
+    pub fn on_cpu(&self) -> bool {
+        match self {
+            Self::Cpu => true,
+            Self::Vulkan { device, .. } => device.info().device_type == vk::PhysicalDeviceType::CPU,
+        }
+    }
+
     /// Chooses by the rules of `rt_backend`.
     ///
     /// # Errors

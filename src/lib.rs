@@ -11,6 +11,7 @@ pub mod console;
 pub mod content;
 pub mod engine;
 pub mod gpu;
+pub mod lighting;
 pub mod metrics;
 pub mod output;
 pub mod recovery;

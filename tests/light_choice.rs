@@ -4,15 +4,28 @@ mod common;
 
 use common::real;
 use glam::Vec3;
-use q3rays::reference::light_choice::choose;
-use q3rays::reference::light_sample::sample_light;
+use q3rays::reference::light_choice::Chances;
+use q3rays::reference::light_sample::{PointSampling, sample_light};
 use q3rays::reference::surface::{SurfaceHit, classify};
-use q3rays::render::settings::LightSampling;
+use q3rays::render::settings::{LightSampling, Settings};
 use q3rays::scene::Scene;
 use q3rays::scene::sampling::{key, pcg, unit};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-const ALL: [LightSampling; 3] = [LightSampling::Uniform, LightSampling::Power, LightSampling::Bvh];
+const ALL: [LightSampling; 4] = [
+    LightSampling::Uniform,
+    LightSampling::Power,
+    LightSampling::Bvh,
+    LightSampling::Cells,
+];
+
+fn chances<'a>(scene: &'a Scene, light_sampling: LightSampling, at: &SurfaceHit) -> Chances<'a> {
+    let settings = Settings {
+        light_sampling,
+        ..Settings::default()
+    };
+    Chances::new(scene, &settings, &scene.rows.pvs, at.row, at)
+}
 
 /// Points on random surfaces of a map, as receivers.
 fn receivers(scene: &Scene, count: u32) -> Vec<SurfaceHit> {
@@ -51,10 +64,11 @@ fn lights_are_chosen_as_often_as_is_told() {
         for (i, at) in receivers(&scene, 6).iter().enumerate() {
             for sampling in ALL {
                 let mut seen: BTreeMap<u32, (f32, u32)> = BTreeMap::new();
+                let chances = chances(&scene, sampling, at);
                 for n in 0..N {
                     // Stratified, so that frequencies are known better than independent numbers would tell.
                     let bits = (n << 15) | (pcg(n) >> 17);
-                    let Some(c) = choose(sampling, &scene.lights, &scene.rows.pvs, at.row, at, bits) else {
+                    let Some(c) = chances.choose(at, bits) else {
                         continue;
                     };
                     let entry = seen.entry(c.light).or_insert((c.probability, 0));
@@ -94,17 +108,22 @@ fn nothing_that_shines_is_left_out() {
         let mut lit = 0;
         for (i, at) in receivers(&scene, 8).iter().enumerate() {
             // Unshadowed irradiance/π by the lights' middles, so that nothing but the choice is left to chance.
+            let listed: BTreeSet<u32> = scene.rows.pvs.lights(at.row).collect();
             let value = |light: u32| {
                 let record = &scene.lights.lights[light as usize];
-                sample_light(&scene, record, at, [0.3, 0.3], false).map_or(0.0, |s| f64::from(s.value.max_element()))
+                // Cells may choose lights that the row has not; these are hidden.
+                let sample = sample_light(&scene, record, at, [0.3, 0.3], PointSampling::Centre);
+                let sample = sample.filter(|_| listed.contains(&light));
+                sample.map_or(0.0, |s| f64::from(s.value.max_element()))
             };
-            let all: f64 = scene.rows.pvs.lights(at.row).map(value).sum();
+            let all: f64 = listed.iter().map(|l| value(*l)).sum();
             lit += usize::from(all > 0.0);
             for sampling in ALL {
                 let (mut sum, mut squares) = (0.0, 0.0);
+                let chances = chances(&scene, sampling, at);
                 for n in 0..N {
                     let bits = pcg(key(i as u32, n, 3));
-                    let choice = choose(sampling, &scene.lights, &scene.rows.pvs, at.row, at, bits);
+                    let choice = chances.choose(at, bits);
                     let x = choice.map_or(0.0, |c| value(c.light) / f64::from(c.probability));
                     sum += x;
                     squares += x * x;

@@ -3,8 +3,10 @@
 
 use q3rays::render::bvh_upload::MeshTree;
 use q3rays::render::frame_constants::{FrameConstants, Push};
+use q3rays::render::reservoirs::Reservoir;
 use q3rays::scene::records::{
-    BspNode, Instance, Light, LightNode, LightRow, LightRun, Material, TextureInfo, Triangle, VertexAttributes,
+    AmbientCube, BspNode, CellEntry, Instance, Light, LightCell, LightNode, LightRow, LightRun, Material, TextureInfo,
+    Triangle, VertexAttributes,
 };
 use std::collections::{BTreeMap, HashMap};
 use std::mem::offset_of;
@@ -125,7 +127,7 @@ fn records() -> Vec<Record> {
             p2,
             padding,
             radiance,
-            padding2
+            scale
         }),
         record!(BspNode { normal, dist, children }),
         record!(LightRow {
@@ -133,6 +135,30 @@ fn records() -> Vec<Record> {
             run_count,
             light_count,
             weight,
+        }),
+        record!(AmbientCube { axes, open }),
+        record!(LightCell {
+            row,
+            place,
+            first,
+            count
+        }),
+        record!(CellEntry {
+            first_light,
+            light_count,
+            probability,
+            weight
+        }),
+        record!(Reservoir {
+            position,
+            shading_normal,
+            geometric_normal,
+            row,
+            light,
+            weight,
+            point,
+            count,
+            target
         }),
         record!(LightRun {
             first_light,
@@ -173,6 +199,10 @@ fn records() -> Vec<Record> {
             light_runs,
             light_nodes,
             light_weights,
+            light_cells,
+            cell_entries,
+            cell_bounds,
+            ambient_cubes,
             textures,
             mesh_trees,
             cwbvh_nodes,
@@ -180,6 +210,8 @@ fn records() -> Vec<Record> {
             bvh2_nodes,
             bvh2_triangles,
             instance_nodes,
+            reservoirs,
+            reservoir_history,
             counters,
             exposure,
             focus,
@@ -192,6 +224,20 @@ fn records() -> Vec<Record> {
             aperture,
             up,
             cone,
+            old_eye,
+            old_half_width,
+            old_forward,
+            old_half_height,
+            old_right,
+            reuse_history,
+            old_up,
+            reuse_neighbours,
+            ambient_origin,
+            ambient,
+            ambient_step,
+            ambient_width,
+            ambient_constant,
+            ambient_height,
             size,
             seed,
             sequence,
@@ -210,6 +256,8 @@ fn records() -> Vec<Record> {
             view,
             fixed_exposure,
             exposure_blend,
+            cell_mask,
+            ambient_depth,
             padding
         }),
         record!(Push {

@@ -8,7 +8,8 @@
 const uint SAMPLING_UNIFORM = 0;
 const uint SAMPLING_POWER = 1;
 const uint SAMPLING_BVH = 2;
-const uint SAMPLING_RESERVOIR = 3;
+const uint SAMPLING_CELLS = 3;
+const uint SAMPLING_RESERVOIR = 4;
 
 struct Choice {
     // NONE where nothing can be chosen.
@@ -236,12 +237,74 @@ Choice choose_by_tree(LightRow row, SurfaceHit at, uint bits) {
     return descend(row.first_run, finite, at, probability, chooser);
 }
 
-// Chooses from a row with 32 random bits.
-Choice choose_light(uint sampling, LightRow row, SurfaceHit at, uint bits) {
-    if (row.light_count == 0) return NO_CHOICE;
-    if (sampling == SAMPLING_UNIFORM) return choose_uniform(row, bits);
-    if (sampling == SAMPLING_POWER) return choose_power(row, bits);
-    return choose_by_tree(row, at, bits);
+// Cube and facing of a receiver: see src/scene/light_cells.rs.
+const float CELL_SIZE = 128.0;
+const float CELL_LIFT = 5.37;
+
+uint light_cell_place(vec3 position, vec3 normal) {
+    ivec3 cube = ivec3(floor((position + normal * CELL_LIFT) / CELL_SIZE));
+    vec3 a = abs(normal) * vec3(1.03, 1.0, 1.07);
+    uint axis = a.z >= a.x && a.z >= a.y ? 2 : a.x >= a.y ? 0 : 1;
+    uint facing = 2 * axis + (normal[axis] < 0.0 ? 1 : 0);
+    uint place = (uint(cube.x) & 1023u) | (uint(cube.y) & 1023u) << 10 | (uint(cube.z) & 511u) << 20;
+    return place << 3 | facing;
+}
+
+// The light cell of a receiver; one without entries where there is none.
+LightCell find_light_cell(uint row, uint place) {
+    LightCell none = LightCell(0, 0, 0, 0);
+    if (FC.cell_mask == NONE) return none;
+    uint at = pcg(row ^ pcg(place)) & FC.cell_mask;
+    [[dont_unroll]] while (true) {
+        LightCell cell = FC.light_cells.at[at];
+        if (cell.count == 0 || (cell.row == row && cell.place == place)) return cell;
+        at = (at + 1) & FC.cell_mask;
+    }
+    return none;
+}
+
+Choice choose_by_cell(LightCell cell, uint bits) {
+    uint from = cell.first;
+    uint to = cell.first + cell.count;
+    [[dont_unroll]] while (to - from > 1) {
+        uint mid = (from + to) >> 1;
+        if (FC.cell_bounds.at[mid] <= bits) from = mid; else to = mid;
+    }
+    CellEntry entry = FC.cell_entries.at[from];
+    if (entry.light_count == 1) return Choice(entry.first_light, entry.probability);
+    uint x = scaled(pcg(bits), entry.weight) + FC.light_weights.at[entry.first_light];
+    uint lo = entry.first_light;
+    uint hi = entry.first_light + entry.light_count;
+    [[dont_unroll]] while (hi - lo > 1) {
+        uint mid = (lo + hi) >> 1;
+        if (FC.light_weights.at[mid] <= x) lo = mid; else hi = mid;
+    }
+    uint weight = FC.light_weights.at[lo + 1] - FC.light_weights.at[lo];
+    return Choice(lo, entry.probability * (float(weight) / float(entry.weight)));
+}
+
+// What lights are chosen by, for one receiver.
+struct Chances {
+    LightRow row;
+    LightCell cell;
+};
+
+Chances chances_at(SurfaceHit at) {
+    uint row = FC.cull_lights == 0 ? FC.all_row : at.row;
+    Chances chances = Chances(FC.light_rows.at[row], LightCell(0, 0, 0, 0));
+    if (FC.light_sampling >= SAMPLING_CELLS && FC.cull_lights != 0) {
+        chances.cell = find_light_cell(row, light_cell_place(at.position, at.geometric_normal));
+    }
+    return chances;
+}
+
+// Chooses with 32 random bits.
+Choice choose_light(Chances chances, SurfaceHit at, uint bits) {
+    if (chances.row.light_count == 0) return NO_CHOICE;
+    if (FC.light_sampling == SAMPLING_UNIFORM) return choose_uniform(chances.row, bits);
+    if (FC.light_sampling == SAMPLING_POWER) return choose_power(chances.row, bits);
+    if (chances.cell.count != 0) return choose_by_cell(chances.cell, bits);
+    return choose_by_tree(chances.row, at, bits);
 }
 
 #endif

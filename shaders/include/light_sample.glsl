@@ -5,6 +5,11 @@
 #include "precise.glsl"
 
 const float PI = 3.14159265358979;
+
+// How the point of a light is sampled.
+const uint POINTS_CENTRE = 0;
+const uint POINTS_AREA = 1;
+const uint POINTS_SOLID_ANGLE = 2;
 const float SMALL_SOLID_ANGLE = 2e-3;
 const float SMALL_SINE = 0.03;
 const float LARGE_SOLID_ANGLE = 0.3;
@@ -107,7 +112,7 @@ struct TrianglePoint {
 
 const float SMALL_EDGE_2 = 0.04;
 
-TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, bool soft) {
+TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, uint points) {
     TrianglePoint r;
     r.factor = 0.0;
     vec3 e1 = light.p1;
@@ -120,7 +125,7 @@ TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, bool soft) {
         r.normal = -r.normal;
     }
     vec3 to_middle = light.p0 + (e1 + e2) * (1.0 / 3.0) - at.position;
-    if (soft && max(dot(e1, e1), dot(e2, e2)) > SMALL_EDGE_2 * dot(to_middle, to_middle)) {
+    if (points == POINTS_SOLID_ANGLE && max(dot(e1, e1), dot(e2, e2)) > SMALL_EDGE_2 * dot(to_middle, to_middle)) {
         vec3 to = light.p0 - at.position;
         SphericalSample s = spherical_triangle(to, light.p0 + e1 - at.position, light.p0 + e2 - at.position, volume, u);
         if (s.kind != SPHERICAL_SMALL) {
@@ -151,7 +156,7 @@ TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, bool soft) {
             return r;
         }
     }
-    r.barycentrics = soft ? sample_triangle_barycentrics(u) : vec2(1.0 / 3.0);
+    r.barycentrics = points == POINTS_CENTRE ? vec2(1.0 / 3.0) : sample_triangle_barycentrics(u);
     r.position = light.p0 + e1 * r.barycentrics.x + e2 * r.barycentrics.y;
     vec3 to_light = r.position - at.position;
     float d2 = dot(to_light, to_light);
@@ -161,17 +166,22 @@ TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, bool soft) {
     return r;
 }
 
-LightSample sample_triangle_light(Light light, SurfaceHit at, vec2 u, bool soft) {
+LightSample sample_triangle_light(Light light, SurfaceHit at, vec2 u, uint points) {
     LightSample r = LightSample(vec3(0.0), vec3(0.0), false);
-    TrianglePoint p = triangle_point(light, at, u, soft);
+    TrianglePoint p = triangle_point(light, at, u, points);
     if (!(p.factor > 0.0)) return r;
     if (light.kind == LIGHT_DOME) {
+        if ((light.flags & LIGHT_EVEN) != 0) {
+            r.value = light.radiance * p.factor;
+            r.target = offset_point(p.position, p.normal);
+            return r;
+        }
         if (p.direction.z <= 0.0) return r;
         float cos_elevation = sqrt(max(1.0 - p.direction.z * p.direction.z, 1e-8));
         r.value = light.radiance * (p.factor / (PI * cos_elevation));
     } else {
         vec2 uv = uv_at(light.triangle, p.barycentrics);
-        r.value = emitted(FC.materials.at[light.material], uv, p.direction) * p.factor;
+        r.value = emitted(FC.materials.at[light.material], uv, p.direction) * (p.factor * light.scale);
     }
     r.target = offset_point(p.position, p.normal);
     return r;
@@ -223,10 +233,11 @@ LightSample sky_sample(SurfaceHit at, float azimuth, float elevation, vec3 value
     return LightSample(value * receiver_cosine(at, direction), direction, true);
 }
 
-LightSample sample_light(Light light, SurfaceHit at, vec2 u, bool soft) {
+LightSample sample_light(Light light, SurfaceHit at, vec2 u, uint points) {
     LightSample r;
+    bool soft = points != POINTS_CENTRE;
     if (light.kind == LIGHT_TRIANGLE || light.kind == LIGHT_DOME) {
-        r = sample_triangle_light(light, at, u, soft);
+        r = sample_triangle_light(light, at, u, points);
     } else if (light.kind == LIGHT_SPHERE) {
         r = sample_sphere_light(light, at, u, soft);
     } else {

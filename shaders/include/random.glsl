@@ -10,6 +10,8 @@ const uint DIM_LIGHT_POINT = 80;
 const uint DIM_CANDIDATE_PICK = 0x1000;
 const uint DIM_CANDIDATE_POINT = 0x2000;
 const uint MAX_CANDIDATES = 32;
+const uint DIM_REUSE = 0x3000;
+const uint DIM_REUSE_KEEP = 0x3100;
 const uint DIM_EVERY_LIGHT = 0x10000;
 
 uint pcg(uint x) {

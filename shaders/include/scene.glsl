@@ -51,6 +51,7 @@ const uint LIGHT_TWO_SIDED = 1;
 const uint LIGHT_LINEAR = 2;
 const uint LIGHT_SPOT = 4;
 const uint LIGHT_NO_COSINE = 8;
+const uint LIGHT_EVEN = 16;
 
 struct Light {
     uint kind;
@@ -64,7 +65,7 @@ struct Light {
     vec3 p2;
     uint padding;
     vec3 radiance;
-    uint padding2;
+    float scale;
 };
 
 struct BspNode {
@@ -98,6 +99,43 @@ struct LightNode {
     uint right;
 };
 
+struct AmbientCube {
+    vec3 axes[6];
+    float open;
+};
+
+struct LightCell {
+    uint row;
+    uint place;
+    uint first;
+    uint count;
+};
+
+struct CellEntry {
+    uint first_light;
+    uint light_count;
+    float probability;
+    uint weight;
+};
+
+// A light sample kept for a pixel, with the receiver it was made for: see reservoir.glsl. The normals are packed.
+struct Reservoir {
+    vec3 position;
+    uint shading_normal;
+    uint geometric_normal;
+    uint row;
+    // NONE for no sample.
+    uint light;
+    // Estimate of the inverse of the sample's pdf in the measure of its random numbers, lights counted; 0 where the sample
+    // is out of view.
+    float weight;
+    vec2 point;
+    // Number of candidates behind it; 0 where the pixel shows no surface.
+    float count;
+    // Luminance of what the sample gives to the receiver.
+    float target;
+};
+
 // Size of a texture: queries of the texture itself cost more, and some drivers answer them wrongly for an index that
 // differs between threads.
 struct TextureInfo {
@@ -129,10 +167,14 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lig
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightRuns { LightRun at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightNodes { LightNode at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightWeights { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer AmbientCubes { AmbientCube at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LightCells { LightCell at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CellEntries { CellEntry at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TextureInfos { TextureInfo at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MeshTrees { MeshTree at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Words4 { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Floats4 { vec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Reservoirs { Reservoir at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Floats { float at[]; };
 
@@ -149,6 +191,10 @@ struct FrameConstants {
     LightRuns light_runs;
     LightNodes light_nodes;
     LightWeights light_weights;
+    LightCells light_cells;
+    CellEntries cell_entries;
+    LightWeights cell_bounds;
+    AmbientCubes ambient_cubes;
     TextureInfos textures;
     MeshTrees mesh_trees;
     Words4 cwbvh_nodes;
@@ -156,6 +202,8 @@ struct FrameConstants {
     Floats4 bvh2_nodes;
     Floats4 bvh2_triangles;
     Floats4 instance_nodes;
+    Reservoirs reservoirs;
+    Reservoirs reservoir_history;
     Counters counters;
     Floats exposure;
     Floats focus;
@@ -168,6 +216,20 @@ struct FrameConstants {
     float aperture;
     vec3 up;
     float cone;
+    vec3 old_eye;
+    float old_half_width;
+    vec3 old_forward;
+    float old_half_height;
+    vec3 old_right;
+    uint reuse_history;
+    vec3 old_up;
+    uint reuse_neighbours;
+    vec3 ambient_origin;
+    uint ambient;
+    vec3 ambient_step;
+    uint ambient_width;
+    vec3 ambient_constant;
+    uint ambient_height;
     uvec2 size;
     uint seed;
     uint sequence;
@@ -186,6 +248,8 @@ struct FrameConstants {
     uint view;
     float fixed_exposure;
     float exposure_blend;
+    uint cell_mask;
+    uint ambient_depth;
     uint padding;
 };
 

@@ -202,6 +202,7 @@ impl Shown {
             sample_index: self.frame,
             accumulated: self.accumulated,
             exposure_blend: (EXPOSURE_RATE * seconds).min(1.0),
+            reuse: self.accumulated <= 1,
             output: true,
         };
         let swapchain = &mut self.swapchain;

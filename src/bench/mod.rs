@@ -1,5 +1,8 @@
 //! Benchmarks that verify what they measure.
 
+pub mod lights;
+pub mod lights_plot;
+pub mod lights_report;
 pub mod ray_buffers;
 pub mod ray_report;
 pub mod rays;

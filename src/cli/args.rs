@@ -136,7 +136,7 @@ fn dispatch() -> CliResult {
     cli.common.apply(&mut cvars)?;
     match cli.command {
         Some(Command::Render(args)) => render::run(&cli.common, cvars, args),
-        Some(Command::Info(args)) => info::run(&cli.common, &args),
+        Some(Command::Info(args)) => info::run(&cli.common, &cvars, &args),
         Some(Command::Lights(args)) => lights::run(&cli.common, cvars.number("rt_seed") as u32, &args),
         Some(Command::Maps(args)) => maps::run(&cli.common, &args),
         Some(Command::Bench(args)) => bench::run(&cli.common, &cvars, &args),

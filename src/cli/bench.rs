@@ -3,15 +3,20 @@
 use super::args::{CliError, CliResult};
 use super::common::{Common, progress};
 use super::render::{camera, parse_size};
+use crate::bench::lights::{LightsBench, Options as LightsOptions};
+use crate::bench::lights_plot;
+use crate::bench::lights_report::LightsReport;
 use crate::bench::ray_report::{MOST_DISAGREEMENT, RaysReport};
 use crate::bench::rays::{EYE_JITTER, RaysBench, RaysOptions};
 use crate::console::Cvars;
+use crate::console::settings::settings;
 use crate::engine::Engine;
 use crate::output::{atomic, stdout};
 use crate::render::backend::Backend;
 use crate::render::scene_gpu::SceneGpu;
 use crate::scene::bvh::BvhQuality;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Arguments of `bench`.
 #[derive(clap::Args)]
@@ -24,6 +29,8 @@ pub struct Args {
 enum What {
     /// Rays per second of the traversal alone
     Rays(RaysArgs),
+    /// Error against time of the ways to choose a light
+    Lights(LightsArgs),
 }
 
 /// Maps of the published figures, from small to large.
@@ -48,6 +55,42 @@ struct RaysArgs {
     json: Option<PathBuf>,
 }
 
+/// Maps from some ten lights to tens of thousands.
+const LIGHT_MAPS: [&str; 10] = [
+    "islanddm",
+    "oa_dm4",
+    "oa_dm1",
+    "kaos",
+    "am_galmevish2",
+    "oa_minia",
+    "ctf_compromise",
+    "slimefac",
+    "oacmpctf3",
+    "oacmpdm1",
+];
+
+#[derive(clap::Args)]
+struct LightsArgs {
+    /// Map names
+    #[arg(default_values = LIGHT_MAPS)]
+    maps: Vec<String>,
+    /// Size of the frames
+    #[arg(long, value_name = "WxH", default_value = "1920x1080", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Samples of each of the two references
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    references: u32,
+    /// Longest time for lighting a frame that is of interest, milliseconds
+    #[arg(long, value_name = "MS", default_value_t = 16.0)]
+    longest: f64,
+    /// Also write everything measured as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Also draw error against time as SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+}
+
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Trees {
     /// As maps are loaded for rendering
@@ -60,7 +103,54 @@ enum Trees {
 pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
     match &args.what {
         What::Rays(args) => rays(common, cvars, args),
+        What::Lights(args) => lights(common, cvars, args),
     }
+}
+
+fn lights(common: &Common, cvars: &Cvars, args: &LightsArgs) -> CliResult {
+    for path in [&args.json, &args.plot].into_iter().flatten() {
+        atomic::create_parent(path).map_err(CliError::failed)?;
+    }
+    let Engine::Vulkan { device, backend } = common.engine(cvars)? else {
+        return Err(CliError::Failed(
+            "bench lights measures Vulkan devices; there is none".to_owned(),
+        ));
+    };
+    let options = LightsOptions {
+        size: args.size,
+        references: args.references,
+        longest: args.longest,
+    };
+    let mut report = LightsReport {
+        device: device.info().name.clone(),
+        driver: device.info().driver.clone(),
+        size: args.size.into(),
+        maps: Vec::new(),
+    };
+    for map in &args.maps {
+        let (scene, _) = common.lit_scene(map, cvars)?;
+        let view = camera(&scene, None, None, FOV)?;
+        let gpu = SceneGpu::new(&device, &scene, backend, BvhQuality::Balanced).map_err(CliError::failed)?;
+        let bench = LightsBench::new(Arc::new(gpu), view, &settings(cvars), options).map_err(CliError::failed)?;
+        let bar = progress(0, map);
+        let measured = bench
+            .run(map, scene.lights.lights.len(), &|step| {
+                bar.set_message(format!("{map}: {step}"))
+            })
+            .map_err(CliError::failed)?;
+        bar.finish_and_clear();
+        report.maps.push(measured);
+        // What is measured is kept, also where a later map fails.
+        if let Some(path) = &args.json {
+            let text = serde_json::to_string_pretty(&report).map_err(CliError::failed)?;
+            atomic::write(path, text.as_bytes()).map_err(CliError::failed)?;
+        }
+    }
+    if let Some(path) = &args.plot {
+        let text = lights_plot::svg(&report).map_err(CliError::failed)?;
+        atomic::write(path, text.as_bytes()).map_err(CliError::failed)?;
+    }
+    stdout::line(&report).map_err(CliError::failed)
 }
 
 /// Field of view of the primary rays, degrees.

@@ -3,10 +3,14 @@
 use super::args::CliError;
 use crate::assets::vfs::{Install, Vfs};
 use crate::console::Cvars;
+use crate::console::settings::lights;
 use crate::content;
 use crate::engine::{BackendChoice, Engine};
 use crate::gpu::ValidationMode;
+use crate::lighting::{self, Lighting};
+use crate::recovery::Options;
 use crate::scene::Scene;
+use directories::ProjectDirs;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
@@ -67,12 +71,45 @@ impl Common {
         Ok(choice.engine)
     }
 
-    /// Loads a map and tells what is missing.
+    /// Loads a map as its files describe it and tells what is missing.
     pub fn scene(&self, map: &str) -> Result<Scene, CliError> {
         let files = self.files()?.focused_on(map);
         let scene = Scene::load(&files, map).map_err(CliError::failed)?;
         report_warnings(&scene);
         Ok(scene)
+    }
+
+    /// Loads a map with the lights that the variables ask for.
+    pub fn lit_scene(&self, map: &str, cvars: &Cvars) -> Result<(Scene, Lighting), CliError> {
+        let files = self.files()?.focused_on(map);
+        let mut scene = Scene::load(&files, map).map_err(CliError::failed)?;
+        report_warnings(&scene);
+        let bar = progress(RECOVERY_STEPS, &format!("{map}: lights"));
+        let lit = lighting::light(
+            &mut scene,
+            &files,
+            lights(cvars),
+            &lights_folder(),
+            &Options::default(),
+            &|share| bar.set_position((share * RECOVERY_STEPS as f32) as u64),
+        );
+        bar.finish_and_clear();
+        let lit = lit.map_err(CliError::failed)?;
+        if let Some(warning) = lit.loaded.as_ref().and_then(|l| l.warning.as_ref()) {
+            eprintln!("warning: {warning}");
+        }
+        Ok((scene, lit))
+    }
+}
+
+/// Steps of the bar that recovering lights moves.
+const RECOVERY_STEPS: u64 = 1000;
+
+/// Where recovered lights are kept: beside the configuration, or for this run alone where there is no home.
+fn lights_folder() -> PathBuf {
+    match ProjectDirs::from("", "", "q3rays") {
+        Some(folders) => folders.config_dir().join("lights"),
+        None => std::env::temp_dir().join("q3rays-lights"),
     }
 }
 

@@ -2,6 +2,8 @@
 
 use super::args::{CliError, CliResult};
 use super::common::Common;
+use super::light_list::LightList;
+use crate::console::Cvars;
 use crate::output::stdout;
 use crate::scene::report::Report;
 use std::collections::BTreeMap;
@@ -15,6 +17,9 @@ pub struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
+    /// List the lights, their sources, and what part of the light in the lightmaps they explain
+    #[arg(long)]
+    lights: bool,
 }
 
 fn list<K: Display, V: Display>(f: &mut fmt::Formatter, title: &str, entries: &BTreeMap<K, V>) -> fmt::Result {
@@ -23,7 +28,17 @@ fn list<K: Display, V: Display>(f: &mut fmt::Formatter, title: &str, entries: &B
 }
 
 /// Describes a map.
-pub fn run(common: &Common, args: &Args) -> CliResult {
+pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
+    if args.lights {
+        let (scene, lit) = common.lit_scene(&args.map, cvars)?;
+        let list = LightList::new(&scene, &lit);
+        return if args.json {
+            stdout::line(serde_json::to_string_pretty(&list).map_err(CliError::failed)?)
+        } else {
+            stdout::line(list)
+        }
+        .map_err(CliError::failed);
+    }
     let scene = common.scene(&args.map)?;
     let r = Report::new(&scene);
     if args.json {

@@ -5,6 +5,7 @@ mod bench;
 mod common;
 mod compare;
 mod info;
+mod light_list;
 mod lights;
 mod maps;
 mod merge;

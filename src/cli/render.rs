@@ -176,7 +176,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     }
     // An output that cannot be written is told before the work is done, not after it.
     atomic::create_parent(&args.out).map_err(CliError::failed)?;
-    let scene = common.scene(&args.map)?;
+    let (scene, _) = common.lit_scene(&args.map, &cvars)?;
     let settings = settings(&cvars);
     let camera = camera(
         &scene,

@@ -47,7 +47,7 @@ const fn choice(name: &'static str, words: &'static [&'static str], help: &'stat
 }
 
 /// Views of the frame's intermediate images, by `rt_view`; the shader's numbering is the order here.
-pub const VIEWS: [&str; 10] = [
+pub const VIEWS: [&str; 11] = [
     "final",
     "albedo",
     "normal",
@@ -58,6 +58,7 @@ pub const VIEWS: [&str; 10] = [
     "material",
     "direct",
     "emission",
+    "ambient",
 ];
 
 /// Every console variable.
@@ -139,17 +140,51 @@ pub const CVARS: &[Cvar] = &[
         "random numbers: Owen-scrambled Sobol points, or independent white noise",
     ),
     choice(
+        "rt_lights",
+        &["all", "known", "recovered"],
+        "which lights a map gets when it is loaded: those its files describe and those found in its lightmaps, both at the \
+         strength that the lightmaps show, those its files describe as they describe them, or those found alone",
+    ),
+    choice(
+        "rt_ambient",
+        &["grid", "constant", "off"],
+        "what stands for light that no light of the map explains: what is left over of the map's light grid, a constant, or \
+         nothing",
+    ),
+    choice(
         "rt_lightSampling",
-        &["uniform", "power", "bvh", "reservoir"],
-        "how a random light is chosen from the receiver's list: all alike, by power, by a tree with an eye to distance and \
-         angle, or the tree's candidates resampled by what they would contribute",
+        &["reservoir", "uniform", "power", "bvh", "cells"],
+        "how a random light is chosen: candidates of `cells` resampled by what they would contribute, every light in the \
+         receiver's list alike, by power, by a tree with an eye to distance and angle, or by what the receiver's \
+         surroundings were found to get from each light",
     ),
     int(
         "rt_lightCandidates",
-        4,
+        2,
         1,
         32,
         "candidates per random light with rt_lightSampling reservoir",
+    ),
+    int(
+        "rt_lightReuse",
+        1,
+        0,
+        1,
+        "reuses light samples between frames and pixels, with rt_lightSampling reservoir and rt_numRandomDL 1",
+    ),
+    int(
+        "rt_reuseHistory",
+        20,
+        0,
+        100,
+        "frames whose light samples a pixel's history counts for at most",
+    ),
+    int(
+        "rt_reuseNeighbours",
+        1,
+        0,
+        4,
+        "neighbours whose light samples a pixel reuses",
     ),
     int("rt_seed", 0, 0, 0xffff_ffff, "seed of all random numbers"),
     int("rt_printPerfStats", 0, 0, 1, "prints times per pass every second"),
@@ -306,7 +341,7 @@ impl Cvars {
     }
 
     /// A number of the table, by its exact name. Names are literals of this program; one that is not in the table reads
-    /// as 0 and fails the test that reads all of [`super::settings::Settings`].
+    /// as 0 and fails the test that reads all of [`crate::render::settings::Settings`].
     pub fn number(&self, name: &str) -> f64 {
         match find(name).map(|at| &self.values[at]) {
             Some(Value::Int(i)) => *i as f64,

@@ -1,8 +1,18 @@
 //! From console variables to the settings of a frame.
 
 use super::Cvars;
-use crate::render::settings::{LightSampling, Settings, Tonemap};
+use crate::lighting::Lights;
+use crate::render::settings::{AmbientLight, LightSampling, Settings, Tonemap};
 use crate::scene::sampling::Sequence;
+
+/// Which lights a map gets.
+pub fn lights(cvars: &Cvars) -> Lights {
+    match cvars.number("rt_lights") as u32 {
+        0 => Lights::All,
+        1 => Lights::Known,
+        _ => Lights::Recovered,
+    }
+}
 
 /// The frame settings that the variables ask for.
 pub fn settings(cvars: &Cvars) -> Settings {
@@ -13,11 +23,20 @@ pub fn settings(cvars: &Cvars) -> Settings {
         cull_lights: number("rt_cullLights") as u32,
         random_lights: number("rt_numRandomDL") as u32,
         light_sampling: match number("rt_lightSampling") as u32 {
-            0 => LightSampling::Uniform,
-            1 => LightSampling::Power,
-            2 => LightSampling::Bvh,
-            _ => LightSampling::Reservoir,
+            0 => LightSampling::Reservoir,
+            1 => LightSampling::Uniform,
+            2 => LightSampling::Power,
+            3 => LightSampling::Bvh,
+            _ => LightSampling::Cells,
         },
+        ambient: match number("rt_ambient") as u32 {
+            0 => AmbientLight::Grid,
+            1 => AmbientLight::Constant,
+            _ => AmbientLight::Off,
+        },
+        light_reuse: number("rt_lightReuse") != 0.0,
+        reuse_history: number("rt_reuseHistory") as u32,
+        reuse_neighbours: number("rt_reuseNeighbours") as u32,
         candidates: number("rt_lightCandidates") as u32,
         soft_shadows: on("rt_softshadows"),
         antialiasing: on("rt_antialiasing"),

@@ -39,6 +39,10 @@ shader_table! {
     "primary_rayquery": "primary.comp" ["TRACE_RAYQUERY" = "1"];
     "direct_bvh": "direct.comp" [];
     "direct_rayquery": "direct.comp" ["TRACE_RAYQUERY" = "1"];
+    "resample_bvh": "resample.comp" [];
+    "resample_rayquery": "resample.comp" ["TRACE_RAYQUERY" = "1"];
+    "reuse_bvh": "reuse.comp" [];
+    "reuse_rayquery": "reuse.comp" ["TRACE_RAYQUERY" = "1"];
     "focus_bvh": "focus.comp" ["TRACE_BVH2" = "1"];
     "focus_rayquery": "focus.comp" ["TRACE_RAYQUERY" = "1"];
     "composite": "composite.comp" [];

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Changes whenever the same map would give other lights than before.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Why there are no lights.
 #[derive(Debug, Error)]
@@ -58,7 +58,8 @@ pub fn path(folder: &Path, map: &str, bytes: &[u8], options: &Options) -> PathBu
     folder.join(format!("{name}-{hash:016x}.lights"))
 }
 
-/// The lights of a scene: what the paks say, or else what `folder` holds, or else a new recovery, which is kept there.
+/// The lights of a scene: what the paks say, or else, where they are to be looked for (`search`), what `folder` holds or a
+/// new recovery, which is kept there.
 ///
 /// # Errors
 /// [`LoadError`] where the paks' file is wrong or nothing can be recovered. A cache that fails is a warning.
@@ -67,14 +68,18 @@ pub fn load_or_recover(
     files: &dyn FileSource,
     folder: &Path,
     options: &Options,
+    search: bool,
     progress: &(dyn Fn(f32) + Sync),
-) -> Result<Loaded, LoadError> {
+) -> Result<Option<Loaded>, LoadError> {
     if let Some(file) = find_override(files, &scene.name)? {
-        return Ok(Loaded {
+        return Ok(Some(Loaded {
             file,
             origin: Origin::Paks,
             warning: None,
-        });
+        }));
+    }
+    if !search {
+        return Ok(None);
     }
     let bytes = files.read(&map_path(&scene.name))?.unwrap_or_else(|| scene.bsp.write());
     let path = path(folder, &scene.name, &bytes, options);
@@ -82,11 +87,11 @@ pub fn load_or_recover(
     if let Ok(text) = std::fs::read_to_string(&path) {
         match LightsFile::parse(&text) {
             Ok(file) => {
-                return Ok(Loaded {
+                return Ok(Some(Loaded {
                     file,
                     origin: Origin::Cache(path),
                     warning: None,
-                });
+                }));
             }
             Err(e) => warning = Some(format!("{} is damaged and is made anew: {e}", path.display())),
         }
@@ -96,11 +101,11 @@ pub fn load_or_recover(
     if let Err(e) = written {
         warning = Some(e.to_string());
     }
-    Ok(Loaded {
+    Ok(Some(Loaded {
         file,
         origin: Origin::Recovered,
         warning,
-    })
+    }))
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Scores on luxels that were never fitted.
 
+use super::encoding::Encoding;
 use super::fit::{Column, Model, Rows};
 use super::luxels::Luxel;
 use super::point::{column, reach};
@@ -10,14 +11,15 @@ use super::visibility::Occluders;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// A prediction as the compiler would have stored it: no channel over 1, hue kept.
-fn as_stored(value: Vec3) -> Vec3 {
-    value / value.max_element().max(1.0)
+/// A prediction as the compiler would have stored it and we would have read it: no channel over 1, hue kept, in whole bytes.
+fn as_stored(value: Vec3, encoding: &Encoding) -> Vec3 {
+    Vec3::from(encoding.encode(value).map(|b| encoding.decode_byte(b)))
 }
 
 /// Luxels that were never fitted, with the columns of the final model there.
 pub struct HeldOut<'a> {
     luxels: &'a [Luxel],
+    encoding: Encoding,
     /// One per column of the model.
     pub columns: Vec<Column>,
 }
@@ -27,6 +29,7 @@ impl<'a> HeldOut<'a> {
     pub fn new(
         occluders: &Occluders,
         luxels: &'a [Luxel],
+        encoding: Encoding,
         dirt: &[f32],
         found: &[Found],
         mut columns: Vec<Column>,
@@ -43,7 +46,26 @@ impl<'a> HeldOut<'a> {
             })
             .collect();
         columns.extend(lights);
-        Self { luxels, columns }
+        Self {
+            luxels,
+            encoding,
+            columns,
+        }
+    }
+
+    /// Share of all light stored that each column gives.
+    pub fn shares(&self, coefficients: &[Vec3]) -> Vec<f64> {
+        let sum = |values: &mut dyn Iterator<Item = Vec3>| values.map(|v| f64::from(v.element_sum())).sum::<f64>();
+        let stored = sum(&mut self.luxels.iter().map(|l| l.stored));
+        self.columns
+            .par_iter()
+            .zip(coefficients)
+            .map(|(column, c)| {
+                let mut given = vec![Vec3::ZERO; self.luxels.len()];
+                column.add_to(&mut given, *c);
+                sum(&mut given.into_iter()) / stored.max(f64::MIN_POSITIVE)
+            })
+            .collect()
     }
 
     fn score(&self, coefficients: &[Vec3]) -> Score {
@@ -55,7 +77,7 @@ impl<'a> HeldOut<'a> {
             .iter()
             .zip(self.luxels)
             .filter(|(_, l)| !l.clamped)
-            .map(|(p, l)| (as_stored(*p), l.stored))
+            .map(|(p, l)| (as_stored(*p, &self.encoding), l.stored))
             .unzip();
         score(&p, &s)
     }

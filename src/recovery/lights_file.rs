@@ -1,7 +1,7 @@
 //! Lights files: what was recovered for a map, as text that people can edit.
 //!
 //! ```text
-//! # Anything after a hash is a comment.
+//! # From a hash that begins a word on, a line is a comment.
 //! map oa_dm1
 //! encoding gamma 1 compensate 1
 //! ambient 0.01 0.01 0.012
@@ -82,6 +82,16 @@ pub struct FileLight {
     pub share: Option<f32>,
 }
 
+/// What the lights of a known term are multiplied by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scale {
+    /// The shader, or `sun:1` and the like.
+    pub name: String,
+    pub scale: f32,
+    /// Share of the stored light that they give, where that is known.
+    pub share: Option<f32>,
+}
+
 /// Everything a lights file says.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightsFile {
@@ -94,7 +104,7 @@ pub struct LightsFile {
     /// Part of the gathered indirect light that the bake had, 0..=1.
     pub indirect: f32,
     /// Scales of known terms by name; 1 where none is given.
-    pub scales: Vec<(String, f32)>,
+    pub scales: Vec<Scale>,
     pub lights: Vec<FileLight>,
 }
 
@@ -166,7 +176,7 @@ impl LightsFile {
     pub fn parse(text: &str) -> Result<Self, LightsFileError> {
         let mut out = Self::default();
         for (i, line) in text.lines().enumerate() {
-            let (line, comment) = line.split_once('#').unwrap_or((line, ""));
+            let (line, comment) = split_comment(line);
             let mut words = Words(line.split_whitespace().peekable());
             out.line(&mut words, comment)
                 .map_err(|problem| LightsFileError { line: i + 1, problem })?;
@@ -190,16 +200,16 @@ impl LightsFile {
                 if scale < 0.0 {
                     return Err(Problem::Negative("scale"));
                 }
-                self.scales.retain(|(n, _)| *n != name);
-                self.scales.push((name, scale));
+                self.scales.retain(|s| s.name != name);
+                self.scales.push(Scale {
+                    name,
+                    scale,
+                    share: explained(comment),
+                });
             }
             "light" => {
                 let mut light = light(words)?;
-                light.share = comment
-                    .split_once("explains")
-                    .and_then(|(_, rest)| rest.trim().trim_end_matches('%').parse::<f32>().ok())
-                    .filter(|s| s.is_finite())
-                    .map(|percent| percent / 100.0);
+                light.share = explained(comment);
                 self.lights.push(light);
             }
             other => return Err(Problem::Unknown(other.to_owned())),
@@ -208,6 +218,24 @@ impl LightsFile {
             Some(more) => Err(Problem::Unknown(more.to_owned())),
             None => Ok(()),
         }
+    }
+}
+
+/// The share that a comment says is explained.
+fn explained(comment: &str) -> Option<f32> {
+    comment
+        .split_once("explains")
+        .and_then(|(_, rest)| rest.trim().trim_end_matches('%').parse::<f32>().ok())
+        .filter(|s| s.is_finite())
+        .map(|percent| percent / 100.0)
+}
+
+/// A line and its comment. Shader names may hold hashes, though not begin with one.
+fn split_comment(line: &str) -> (&str, &str) {
+    let begins_word = |i: &usize| line[..*i].chars().next_back().is_none_or(char::is_whitespace);
+    match line.match_indices('#').map(|(i, _)| i).find(begins_word) {
+        Some(i) => (&line[..i], &line[i + 1..]),
+        None => (line, ""),
     }
 }
 
@@ -278,8 +306,12 @@ impl Display for LightsFile {
         writeln!(f, "ambient {}", triple(self.ambient))?;
         writeln!(f, "sky {}", triple(self.sky))?;
         writeln!(f, "indirect {}", self.indirect)?;
-        for (name, scale) in &self.scales {
-            writeln!(f, "scale {name} {scale}")?;
+        for s in &self.scales {
+            write!(f, "scale {} {}", s.name, s.scale)?;
+            if let Some(share) = s.share {
+                write!(f, " # explains {}%", share * 100.0)?;
+            }
+            writeln!(f)?;
         }
         for l in &self.lights {
             let mut line = format!(
@@ -307,6 +339,14 @@ impl Display for LightsFile {
 mod tests {
     use super::*;
 
+    fn scale(name: &str, scale: f32) -> Scale {
+        Scale {
+            name: name.to_owned(),
+            scale,
+            share: None,
+        }
+    }
+
     fn full() -> LightsFile {
         LightsFile {
             map: "a_map".to_owned(),
@@ -318,7 +358,11 @@ mod tests {
             ambient: Vec3::new(0.01, 0.02, 1.0 / 3.0),
             sky: Vec3::new(0.0, 0.25, 1e-7),
             indirect: 0.75,
-            scales: vec![("textures/a/b".to_owned(), 0.93), ("sun:4".to_owned(), 0.0)],
+            scales: vec![
+                scale("textures/a/b", 0.93),
+                scale("textures/a/#hash", 0.5),
+                scale("sun:4", 0.0),
+            ],
             lights: vec![
                 FileLight {
                     origin: Vec3::new(-1.5, 1e5, 0.1),

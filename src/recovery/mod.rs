@@ -9,6 +9,7 @@
 
 pub mod cache;
 pub mod candidates;
+pub mod dome;
 pub mod emitter;
 pub mod encoding;
 pub mod fit;

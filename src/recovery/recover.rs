@@ -59,6 +59,8 @@ impl Default for Options {
 
 /// Fewer luxels than this tell nothing.
 const LEAST_LUXELS: usize = 200;
+/// One in so many luxels may be tested; the others may be fitted.
+const TESTED_ONE_IN: u32 = 3;
 /// Part of the fitting luxels drawn uniformly by area; the others by area and brightness.
 const BY_AREA: f32 = 0.3;
 /// Brightness that counts at most in the choice, luxel units.
@@ -72,6 +74,8 @@ pub struct TermScale {
     pub kind: TermKind,
     pub name: String,
     pub scale: f32,
+    /// Share of the stored light that it gives, on luxels never fitted.
+    pub share: f64,
 }
 
 /// One luxel with everything predicted there, E/π in luxel units.
@@ -127,25 +131,23 @@ impl Timer {
 /// Luxels of the fit, then those of the test; and the number of the former.
 fn sample(all: &[Luxel], options: &Options) -> (Vec<Luxel>, usize) {
     let mut random = Random::new(options.seed, 0x5341, 0);
-    let mut taken = vec![false; all.len()];
+    // Chance decides before the draw which luxels may be tested: luxels that are larger than a draw's step (outlying
+    // terrain has some of 800 units) would all go to whoever draws first.
     let held: Vec<bool> = all
         .iter()
-        .map(|l| options.hold_out_surfaces && held_out_surface(l.surface, options.seed))
+        .map(|l| {
+            let chosen = random.bits().is_multiple_of(TESTED_ONE_IN);
+            if options.hold_out_surfaces {
+                held_out_surface(l.surface, options.seed)
+            } else {
+                chosen
+            }
+        })
         .collect();
-    if options.hold_out_surfaces {
-        taken.iter_mut().zip(&held).for_each(|(t, h)| *t = !h);
-    }
+    let mut taken: Vec<bool> = held.iter().map(|h| !h).collect();
     let area = |l: &Luxel| l.area;
-    let tested = choose(
-        all,
-        options.test_luxels.min(all.len() / 3),
-        area,
-        &mut taken,
-        &mut random,
-    );
-    if options.hold_out_surfaces {
-        taken.clone_from(&held);
-    }
+    let tested = choose(all, options.test_luxels, area, &mut taken, &mut random);
+    taken.clone_from(&held);
     let by_area = (options.fit_luxels as f32 * BY_AREA) as usize;
     let bright = |l: &Luxel| l.area * l.stored.max_element().min(BRIGHTEST);
     let mut fitted = choose(all, by_area, area, &mut taken, &mut random);
@@ -277,23 +279,32 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     timer.lap("search");
     rows.train.fill(true);
     model.refit(&rows, 4, 40);
-    let held = HeldOut::new(&occluders, &luxels[fitted..], &dirt[fitted..], &found, {
+    let held = HeldOut::new(&occluders, &luxels[fitted..], encoding, &dirt[fitted..], &found, {
         fixed_columns(&gathered, &dirt, &terms, fitted..luxels.len())
     });
     let scores = held.scores(&rows, &model, terms.len());
+    let shares = held.shares(&model.coefficients);
     timer.lap("scores");
     let lights = found
         .iter()
         .zip(&model.coefficients[FIRST_TERM + terms.len()..])
-        .map(|(f, power)| Found { power: *power, ..*f })
+        .zip(&shares[FIRST_TERM + terms.len()..])
+        .map(|((f, power), share)| Found {
+            power: *power,
+            share: *share,
+            ..*f
+        })
+        .filter(|f| f.power.max_element() > 0.0)
         .collect();
     let scales = terms
         .iter()
         .zip(&model.coefficients[FIRST_TERM..])
-        .map(|(t, c)| TermScale {
+        .zip(&shares[FIRST_TERM..])
+        .map(|((t, c), share)| TermScale {
             kind: t.kind.clone(),
             name: t.name.clone(),
             scale: c.x,
+            share: *share,
         })
         .collect();
     let mut rows_out = luxel_rows(fit_luxels, &model.columns, &model.coefficients, terms.len(), false);

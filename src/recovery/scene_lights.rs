@@ -1,12 +1,15 @@
 //! Recovered lights as lights of a scene.
 
-use super::lights_file::{FileLight, LightsFile};
+use super::known::{in_lights_file, light_terms};
+use super::lights_file::{FileLight, LightsFile, Scale};
 use super::recover::Recovery;
-use crate::assets::bsp::{Bounds, Bsp};
-use crate::scene::clusters::{ClusterMap, LightReach};
+use crate::assets::bsp::Bounds;
+use crate::scene::Scene;
+use crate::scene::clusters::LightReach;
 use crate::scene::lights::{LightSource, LightTable, POINT_RADIUS};
 use crate::scene::records::{LIGHT_SPHERE, LIGHT_SPOT, Light, NONE};
 use glam::Vec3;
+use std::collections::HashMap;
 
 /// A point light of N has luxel value 7500·N·cosθ/d², 255 of which are 1.
 const POINT_SCALE: f32 = 7500.0 / 255.0;
@@ -34,24 +37,39 @@ pub fn sphere(light: &FileLight) -> Light {
         p2: [cone, 0.0, light.photons / 255.0],
         padding: 0,
         radiance: (light.color * (POINT_SCALE * light.photons / (radius * radius))).into(),
-        padding2: 0,
+        scale: 1.0,
     }
 }
 
-/// Appends a file's lights to a scene's, in the file's order. The light rows have to be built anew afterwards.
-pub fn append(table: &mut LightTable, bsp: &Bsp, clusters: &ClusterMap, file: &LightsFile) {
+/// Gives a scene the lights of a lights file: with `known` besides those that it has, scaled as the file says, else alone.
+pub fn apply(scene: &mut Scene, file: &LightsFile, known: bool) {
+    let mut table = if known {
+        let scales: HashMap<&str, f32> = file.scales.iter().map(|s| (s.name.as_str(), s.scale)).collect();
+        let terms = light_terms(scene);
+        scene
+            .lights
+            .scaled(|i| terms[i].as_deref().and_then(|t| scales.get(t)).copied().unwrap_or(1.0))
+    } else {
+        LightTable::default()
+    };
     for light in &file.lights {
         let record = sphere(light);
         let around = Bounds {
             min: light.origin - record.size,
             max: light.origin + record.size,
         };
+        let clusters = scene.bsp.cluster_at(light.origin);
         let reach = LightReach {
-            clusters: bsp.cluster_at(light.origin).map(|_| clusters.in_box(bsp, around)),
+            clusters: clusters.map(|_| scene.clusters.in_box(&scene.bsp, around)),
             front: None,
         };
         table.push(LightSource::Recovered, record, reach);
     }
+    if file.sky != Vec3::ZERO {
+        let placements = scene.mesh_placements();
+        table.add_even_sky(&scene.light_inputs(&placements), file.sky);
+    }
+    scene.relight(table);
 }
 
 impl From<&Recovery> for LightsFile {
@@ -62,11 +80,18 @@ impl From<&Recovery> for LightsFile {
             ambient: r.ambient,
             sky: r.sky,
             indirect: r.indirect,
-            scales: r.scales.iter().map(|s| (s.name.replace(' ', ":"), s.scale)).collect(),
+            scales: r
+                .scales
+                .iter()
+                .map(|s| Scale {
+                    name: in_lights_file(&s.name),
+                    scale: s.scale,
+                    share: Some(s.share as f32),
+                })
+                .collect(),
             lights: r
                 .lights
                 .iter()
-                .filter(|l| l.power.max_element() > 0.0)
                 .map(|l| FileLight {
                     origin: l.position,
                     photons: l.power.max_element(),

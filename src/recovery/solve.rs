@@ -39,7 +39,8 @@ pub struct Found {
     pub position: Vec3,
     /// Photons per channel, as the entity key `light` counts them.
     pub power: Vec3,
-    /// Share of the cost that would come back without it.
+    /// Share of the cost that would come back without it; of a finished recovery, share of the stored light that it gives, on
+    /// luxels never fitted.
     pub share: f64,
 }
 
@@ -246,10 +247,13 @@ impl<'a> Solver<'a> {
         const ROUNDS: usize = 18;
         const STILL: f64 = 2e-4;
         let mut cost = self.search.rows.total_cost(&self.model.residual);
+        let mut still = 0;
         for round in 0..ROUNDS {
             self.cycle(OLD_RADIUS / (1 + round / 6) as f32);
             let now = self.search.rows.total_cost(&self.model.residual);
-            if now > cost * (1.0 - STILL) {
+            // One round may have drawn poor proposals.
+            still = if now > cost * (1.0 - STILL) { still + 1 } else { 0 };
+            if still == 2 {
                 break;
             }
             cost = now;

@@ -1,6 +1,7 @@
 //! Visibility as the map compiler saw it: solid leafs and opaque drawn surfaces of the world, no brush models.
 
 use super::luxels::Luxel;
+use super::random::Random;
 use crate::reference::trace::{Hit, Tracer};
 use crate::scene::Scene;
 use crate::scene::clusters::cluster_at;
@@ -46,6 +47,16 @@ impl<'a> Occluders<'a> {
             .into_iter()
             .take(if self.filtered { 4 } else { 1 })
             .map(move |(u, v)| luxel.moved(u, v))
+    }
+
+    /// A luxel's place for one ray: at random as `-filter` spreads light (1 2 1 is a triangle of half width 1), if it does.
+    pub fn spread(&self, luxel: &Luxel, random: &mut Random) -> Luxel {
+        if !self.filtered {
+            return *luxel;
+        }
+        let mut triangle = || random.unit() - random.unit();
+        let place = luxel.moved(triangle(), triangle());
+        if self.open(&place) { place } else { *luxel }
     }
 
     /// Whether a luxel's sample there would lie in the open.

@@ -1,9 +1,10 @@
 //! Direct light by next-event estimation. Counterpart of `shaders/direct.comp`.
 
-use super::light_choice::choose;
-use super::light_sample::{LightSample, Target, sample_light};
+use super::light_choice::Chances;
+use super::light_sample::{LightSample, PointSampling, sample_light};
 use super::surface::{SurfaceHit, offset_point};
 use super::trace::Tracer;
+use super::visibility::visible;
 use crate::render::settings::{LightSampling, Settings};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
@@ -47,11 +48,12 @@ pub fn light_row<'a>(scene: &'a Scene, settings: &Settings, row: u32) -> (&'a Li
     }
 }
 
-fn visible(scene: &Scene, tracer: &Tracer, at: &SurfaceHit, sample: &LightSample) -> bool {
-    let origin = offset_point(at.position, at.geometric_normal);
-    match sample.target {
-        Target::Point(point) => !tracer.occluded(scene, origin, point - origin, 1.0),
-        Target::Sky(direction) => tracer.sees_sky(scene, origin, direction),
+/// Lights chosen uniformly are sampled by area, as the thesis does; the ways that choose with more care sample with more.
+pub fn point_sampling(settings: &Settings) -> PointSampling {
+    match settings.light_sampling {
+        _ if !settings.soft_shadows => PointSampling::Centre,
+        LightSampling::Uniform => PointSampling::Area,
+        _ => PointSampling::SolidAngle,
     }
 }
 
@@ -70,6 +72,7 @@ pub fn direct_light(
         settings,
         at,
         address,
+        points: point_sampling(settings),
     };
     let (lists, row) = light_row(scene, settings, at.row);
     if settings.random_lights == 0 {
@@ -80,17 +83,45 @@ pub fn direct_light(
     }
     let share = 1.0 / settings.random_lights as f32;
     (0..settings.random_lights)
-        .map(|i| match settings.light_sampling {
-            LightSampling::Reservoir => estimator.resampled(lists, row, i, counts) * share,
-            _ => {
-                let bits = estimator.bits(DIM_LIGHT_PICK + i)[0];
-                match choose(settings.light_sampling, &scene.lights, lists, row, at, bits) {
-                    Some(c) => estimator.one(c.light, DIM_LIGHT_POINT + i, share / c.probability, counts),
-                    None => Vec3::ZERO,
-                }
-            }
+        .map(|i| match estimator.taken(&estimator.chances(), i, 0) {
+            Some(taken) => estimator.traced(taken.sample, taken.weight * share, counts),
+            None => Vec3::ZERO,
         })
         .sum()
+}
+
+/// A light sample that an estimate takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    pub light: u32,
+    /// Random numbers of its point.
+    pub u: [f32; 2],
+    /// `None` where it gives nothing.
+    pub sample: Option<LightSample>,
+    /// Inverse of the probability that the light was chosen, or what resampling puts in its place.
+    pub weight: f32,
+}
+
+/// The sample that an estimate at a surface takes for its `i`-th random light; `None` for none at all. `steps` moves the
+/// numbers that choose by as many steps of a float: 0 but where the choice itself is examined.
+pub fn taken_sample(
+    scene: &Scene,
+    tracer: &Tracer,
+    settings: &Settings,
+    at: &SurfaceHit,
+    address: SampleAddress,
+    i: u32,
+    steps: i32,
+) -> Option<Taken> {
+    let estimator = Estimator {
+        scene,
+        tracer,
+        settings,
+        at,
+        address,
+        points: point_sampling(settings),
+    };
+    estimator.taken(&estimator.chances(), i, steps)
 }
 
 struct Estimator<'a> {
@@ -99,6 +130,7 @@ struct Estimator<'a> {
     settings: &'a Settings,
     at: &'a SurfaceHit,
     address: SampleAddress,
+    points: PointSampling,
 }
 
 impl Estimator<'_> {
@@ -107,10 +139,15 @@ impl Estimator<'_> {
         bits2(self.settings.sequence, key, self.address.index)
     }
 
+    fn chances(&self) -> Chances<'_> {
+        let (lists, row) = light_row(self.scene, self.settings, self.at.row);
+        Chances::new(self.scene, self.settings, lists, row, self.at)
+    }
+
     fn sample(&self, light: u32, dimension: u32) -> Option<LightSample> {
         let record = &self.scene.lights.lights[light as usize];
         let u = self.bits(dimension).map(unit);
-        sample_light(self.scene, record, self.at, u, self.settings.soft_shadows)
+        sample_light(self.scene, record, self.at, u, self.points)
     }
 
     fn traced(&self, sample: Option<LightSample>, weight: f32, counts: &mut RayCounts) -> Vec3 {
@@ -119,7 +156,8 @@ impl Estimator<'_> {
             return Vec3::ZERO;
         };
         counts.shadow += 1;
-        if visible(self.scene, self.tracer, self.at, &sample) {
+        let origin = offset_point(self.at.position, self.at.geometric_normal);
+        if visible(self.scene, self.tracer, origin, &sample) {
             sample.value * weight
         } else {
             Vec3::ZERO
@@ -131,15 +169,30 @@ impl Estimator<'_> {
         self.traced(self.sample(light, dimension), weight, counts)
     }
 
-    /// Contribution of one light resampled from candidates in proportion to what they give without visibility (Talbot,
-    /// Cline and Egbert 2005, "Importance Resampling for Global Illumination").
-    fn resampled(&self, lists: &LightLists, row: u32, i: u32, counts: &mut RayCounts) -> Vec3 {
+    fn taken(&self, chances: &Chances<'_>, i: u32, steps: i32) -> Option<Taken> {
+        if self.settings.light_sampling == LightSampling::Reservoir {
+            return self.resampled(chances, i, steps);
+        }
+        let [bits, _] = self.bits(DIM_LIGHT_PICK + i);
+        let choice = chances.choose(self.at, bits.saturating_add_signed(steps << 8))?;
+        Some(Taken {
+            light: choice.light,
+            u: self.bits(DIM_LIGHT_POINT + i).map(unit),
+            sample: self.sample(choice.light, DIM_LIGHT_POINT + i),
+            weight: 1.0 / choice.probability,
+        })
+    }
+
+    /// One light resampled from candidates in proportion to what they give without visibility (Talbot, Cline and Egbert
+    /// 2005, "Importance Resampling for Global Illumination").
+    fn resampled(&self, chances: &Chances<'_>, i: u32, steps: i32) -> Option<Taken> {
         let n = self.settings.candidates.clamp(1, MAX_CANDIDATES);
         let (mut kept, mut kept_target, mut sum) = (None, 0.0, 0.0);
         for c in i * MAX_CANDIDATES..i * MAX_CANDIDATES + n {
-            let [pick, keep] = self.bits(DIM_CANDIDATE_PICK + c);
-            let sampling = LightSampling::Reservoir;
-            let Some(choice) = choose(sampling, &self.scene.lights, lists, row, self.at, pick) else {
+            let [pick, keep] = self
+                .bits(DIM_CANDIDATE_PICK + c)
+                .map(|b| b.saturating_add_signed(steps << 8));
+            let Some(choice) = chances.choose(self.at, pick) else {
                 continue;
             };
             let Some(sample) = self.sample(choice.light, DIM_CANDIDATE_POINT + c) else {
@@ -149,14 +202,15 @@ impl Estimator<'_> {
             let weight = target / choice.probability;
             sum += weight;
             if unit(keep) * sum < weight {
-                (kept, kept_target) = (Some(sample), target);
+                (kept, kept_target) = (Some((choice.light, c, sample)), target);
             }
         }
-        let weight = if kept_target > 0.0 {
-            sum / (kept_target * n as f32)
-        } else {
-            0.0
-        };
-        self.traced(kept, weight, counts)
+        let (light, c, sample) = kept.filter(|_| kept_target > 0.0)?;
+        Some(Taken {
+            light,
+            u: self.bits(DIM_CANDIDATE_POINT + c).map(unit),
+            sample: Some(sample),
+            weight: sum / (kept_target * n as f32),
+        })
     }
 }

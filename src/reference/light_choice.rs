@@ -5,8 +5,10 @@
 //! with the choice. A light that can reach the receiver has a probability above 0 in each of them.
 
 use super::surface::SurfaceHit;
-use crate::render::settings::LightSampling;
+use crate::render::settings::{LightSampling, Settings};
+use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
+use crate::scene::light_cells::{CellView, place};
 use crate::scene::light_power::luminance;
 use crate::scene::light_tree::LightTree;
 use crate::scene::lights::LightTable;
@@ -22,25 +24,66 @@ pub struct Choice {
     pub probability: f32,
 }
 
-/// Chooses from `row` with 32 random bits; `None` where no light of the row can reach the receiver, as far as the way of
-/// choosing can tell.
-pub fn choose(
+/// What lights are chosen by, for one receiver.
+#[derive(Clone, Copy)]
+pub struct Chances<'a> {
+    lights: &'a LightTable,
+    row: LightRow,
+    runs: &'a [LightRun],
     sampling: LightSampling,
-    lights: &LightTable,
-    lists: &LightLists,
-    row: u32,
-    at: &SurfaceHit,
-    bits: u32,
-) -> Option<Choice> {
-    let row = lists.rows[row as usize];
-    if row.light_count == 0 {
-        return None;
+    /// The receiver's light cell where it is to be used and there is one.
+    cell: CellView<'a>,
+}
+
+impl<'a> Chances<'a> {
+    /// `lists` and `row` are what culling leaves; light cells know of culling by the PVS alone, and the tree stands in
+    /// where there is none or no cell.
+    pub fn new(scene: &'a Scene, settings: &Settings, lists: &'a LightLists, row: u32, at: &SurfaceHit) -> Self {
+        let by_cell = matches!(settings.light_sampling, LightSampling::Cells | LightSampling::Reservoir);
+        let record = lists.rows[row as usize];
+        Self {
+            lights: &scene.lights,
+            row: record,
+            runs: &lists.runs[record.first_run as usize..(record.first_run + record.run_count) as usize],
+            sampling: settings.light_sampling,
+            cell: if by_cell && settings.cull_lights > 0 {
+                scene.cells.find(row, place(at.position, at.geometric_normal))
+            } else {
+                CellView::default()
+            },
+        }
     }
-    let runs = &lists.runs[row.first_run as usize..(row.first_run + row.run_count) as usize];
-    match sampling {
-        LightSampling::Uniform => Some(choose_uniform(row, runs, bits)),
-        LightSampling::Power => Some(choose_power(&lights.weights, row, runs, bits)),
-        LightSampling::Bvh | LightSampling::Reservoir => choose_by_tree(lights, row, runs, at, bits),
+
+    /// Chooses with 32 random bits; `None` where no light can reach the receiver, as far as the way of choosing can tell.
+    pub fn choose(&self, at: &SurfaceHit, bits: u32) -> Option<Choice> {
+        if self.row.light_count == 0 {
+            return None;
+        }
+        match self.sampling {
+            LightSampling::Uniform => Some(choose_uniform(self.row, self.runs, bits)),
+            LightSampling::Power => Some(choose_power(&self.lights.weights, self.row, self.runs, bits)),
+            _ if !self.cell.entries.is_empty() => Some(choose_by_cell(&self.lights.weights, self.cell, bits)),
+            _ => choose_by_tree(self.lights, self.row, self.runs, at, bits),
+        }
+    }
+}
+
+/// An entry of the cell by its bounds, and a light of its range by power.
+fn choose_by_cell(sums: &[u32], cell: CellView<'_>, bits: u32) -> Choice {
+    let entry = &cell.entries[cell.bounds.partition_point(|b| *b <= bits) - 1];
+    if entry.light_count == 1 {
+        return Choice {
+            light: entry.first_light,
+            probability: entry.probability,
+        };
+    }
+    let x = scaled(pcg(bits), entry.weight) + sums[entry.first_light as usize];
+    let range = entry.first_light as usize..(entry.first_light + entry.light_count) as usize;
+    let light = entry.first_light + sums[range].partition_point(|s| *s <= x) as u32 - 1;
+    let weight = sums[light as usize + 1] - sums[light as usize];
+    Choice {
+        light,
+        probability: entry.probability * (weight as f32 / entry.weight as f32),
     }
 }
 
@@ -73,7 +116,7 @@ fn choose_power(sums: &[u32], row: LightRow, runs: &[LightRun], bits: u32) -> Ch
 
 /// Estimated irradiance/π that the node's lights give per strength: cosines at both ends at their best, over a squared
 /// distance between those to the middle and to the box. 0 only where the node cannot light the receiver.
-fn importance(node: &LightNode, at: &SurfaceHit) -> f32 {
+pub fn importance(node: &LightNode, at: &SurfaceHit) -> f32 {
     let half = Vec3::from(node.half_size);
     let axis = Vec3::from(node.axis);
     let to = Vec3::from(node.centre) - at.position;
@@ -121,7 +164,7 @@ fn widened(cos: f32, sin_by: f32, cos_by: f32) -> f32 {
 }
 
 /// Estimated irradiance/π of a sun at a receiver. 0 only where no point of it is above the horizon.
-fn sun_importance(light: &Light, at: &SurfaceHit) -> f32 {
+pub fn sun_importance(light: &Light, at: &SurfaceHit) -> f32 {
     // A disc in azimuth and elevation reaches no farther than its radius from its middle.
     let (sin, cos) = light.p1[2].sin_cos();
     widened(at.shading_normal.dot(Vec3::from(light.p0)), sin, cos).max(0.0) * sun_strength(light)
@@ -134,22 +177,23 @@ fn sun_strength(light: &Light) -> f32 {
 
 /// The part of a row's runs that lies in a node.
 #[derive(Clone, Copy)]
-struct Part {
+pub struct Part {
     /// Runs `from..to` of the row.
-    from: usize,
-    to: usize,
+    pub from: usize,
+    pub to: usize,
     /// Weight of the row's lights before the node and before its end.
-    before: u32,
-    after: u32,
+    pub before: u32,
+    pub after: u32,
 }
 
 impl Part {
-    fn weight(&self) -> u32 {
+    /// Weight of the row's lights in the part.
+    pub fn weight(&self) -> u32 {
         self.after - self.before
     }
 
     /// The parts in front of light `middle` and from it on.
-    fn split(&self, sums: &[u32], runs: &[LightRun], middle: u32) -> (Self, Self) {
+    pub fn split(&self, sums: &[u32], runs: &[LightRun], middle: u32) -> (Self, Self) {
         let k = self.from + runs[self.from..self.to].partition_point(|r| r.first_light < middle);
         if k == self.from {
             let left = Self {

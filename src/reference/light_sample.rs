@@ -7,8 +7,8 @@ use super::surface::{SurfaceHit, emitted, offset_point};
 use super::texture::uv_at;
 use crate::scene::Scene;
 use crate::scene::records::{
-    LIGHT_DOME, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, LIGHT_TWO_SIDED,
-    Light,
+    LIGHT_DOME, LIGHT_EVEN, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE,
+    LIGHT_TWO_SIDED, Light,
 };
 use crate::scene::sampling::{disc, triangle};
 use glam::Vec3;
@@ -42,13 +42,31 @@ pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
     )
 }
 
+/// How the point of a light is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointSampling {
+    /// Its middle: hard shadows.
+    Centre,
+    /// Triangles uniformly in area.
+    Area,
+    /// Near triangles uniformly in solid angle.
+    SolidAngle,
+}
+
 /// Samples a light; `None` where the sample contributes nothing.
-pub fn sample_light(scene: &Scene, light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Option<LightSample> {
+pub fn sample_light(
+    scene: &Scene,
+    light: &Light,
+    at: &SurfaceHit,
+    u: [f32; 2],
+    points: PointSampling,
+) -> Option<LightSample> {
+    let soft = points != PointSampling::Centre;
     let sample = match light.kind {
-        LIGHT_TRIANGLE => sample_triangle(scene, light, at, u, soft),
+        LIGHT_TRIANGLE => sample_triangle(scene, light, at, u, points),
         LIGHT_SPHERE => sample_sphere(light, at, u, soft),
         LIGHT_SUN => sample_sun(light, at, u, soft),
-        LIGHT_DOME => sample_dome(light, at, u, soft),
+        LIGHT_DOME => sample_dome(light, at, u, points),
         _ => None,
     }?;
     (sample.value.max_element() > 0.0 && sample.value.is_finite()).then_some(sample)
@@ -85,7 +103,7 @@ const SMALL_SINE: f32 = 0.03;
 /// Solid angle beyond which a triangle without such a corner is large.
 const LARGE_SOLID_ANGLE: f32 = 0.3;
 
-fn triangle_point(light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Option<TrianglePoint> {
+fn triangle_point(light: &Light, at: &SurfaceHit, u: [f32; 2], points: PointSampling) -> Option<TrianglePoint> {
     let (p0, e1, e2) = (Vec3::from(light.p0), Vec3::from(light.p1), Vec3::from(light.p2));
     let mut normal = e1.cross(e2);
     // Of the parallelepiped between the receiver and the triangle's edges.
@@ -99,7 +117,7 @@ fn triangle_point(light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Op
     }
     let to_middle = p0 + (e1 + e2) * (1.0 / 3.0) - at.position;
     let near = e1.length_squared().max(e2.length_squared()) > SMALL_EDGE_2 * to_middle.length_squared();
-    if soft && near {
+    if points == PointSampling::SolidAngle && near {
         let corners = [p0 - at.position, p0 + e1 - at.position, p0 + e2 - at.position];
         match spherical_triangle(corners, volume, u) {
             SphericalSample::Uniform { direction, solid_angle } => {
@@ -132,7 +150,11 @@ fn triangle_point(light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Op
             SphericalSample::Small => {}
         }
     }
-    let [b1, b2] = if soft { triangle(u) } else { [1.0 / 3.0; 2] };
+    let [b1, b2] = if points == PointSampling::Centre {
+        [1.0 / 3.0; 2]
+    } else {
+        triangle(u)
+    };
     let position = p0 + e1 * b1 + e2 * b2;
     let to_light = position - at.position;
     let d2 = to_light.length_squared();
@@ -229,19 +251,32 @@ fn spherical_triangle(corners: [Vec3; 3], volume: f32, u: [f32; 2]) -> Spherical
     }
 }
 
-fn sample_triangle(scene: &Scene, light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Option<LightSample> {
-    let p = triangle_point(light, at, u, soft).filter(|p| p.factor > 0.0)?;
+fn sample_triangle(
+    scene: &Scene,
+    light: &Light,
+    at: &SurfaceHit,
+    u: [f32; 2],
+    points: PointSampling,
+) -> Option<LightSample> {
+    let p = triangle_point(light, at, u, points).filter(|p| p.factor > 0.0)?;
     let uv = uv_at(scene, light.triangle, p.barycentrics);
     let radiance = emitted(scene, &scene.materials[light.material as usize], uv, p.direction);
     Some(LightSample {
-        value: radiance * p.factor,
+        value: radiance * (p.factor * light.scale),
         target: Target::Point(offset_point(p.position, p.normal)),
     })
 }
 
 /// The compiler spreads its suns evenly in azimuth and elevation: the dome's radiance is V/(255·π·cos elevation).
-fn sample_dome(light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Option<LightSample> {
-    let p = triangle_point(light, at, u, soft).filter(|p| p.factor > 0.0 && p.direction.z > 0.0)?;
+fn sample_dome(light: &Light, at: &SurfaceHit, u: [f32; 2], points: PointSampling) -> Option<LightSample> {
+    let even = light.flags & LIGHT_EVEN != 0;
+    let p = triangle_point(light, at, u, points).filter(|p| p.factor > 0.0 && (even || p.direction.z > 0.0))?;
+    if even {
+        return Some(LightSample {
+            value: Vec3::from(light.radiance) * p.factor,
+            target: Target::Point(offset_point(p.position, p.normal)),
+        });
+    }
     let cos_elevation = (1.0 - p.direction.z * p.direction.z).max(1e-8).sqrt();
     Some(LightSample {
         value: Vec3::from(light.radiance) * (p.factor / (PI * cos_elevation)),

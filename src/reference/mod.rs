@@ -4,6 +4,7 @@
 //! done in double precision.
 
 pub mod direct;
+pub mod light_cells;
 pub mod light_choice;
 pub mod light_sample;
 pub mod primary;
@@ -11,5 +12,6 @@ pub mod renderer;
 pub mod surface;
 pub mod texture;
 pub mod trace;
+pub mod visibility;
 
 pub use renderer::CpuRenderer;

@@ -2,10 +2,10 @@
 
 use super::direct::{RayCounts, SampleAddress, direct_light};
 use super::primary::{CameraRay, View};
-use super::surface::{emission_seen, surface_at};
+use super::surface::{SurfaceHit, emission_seen, surface_at};
 use super::trace::Tracer;
 use crate::render::film::{Aovs, Film};
-use crate::render::settings::Settings;
+use crate::render::settings::{AmbientLight, Settings};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::records::NONE;
@@ -29,6 +29,15 @@ pub struct SampleRadiance {
 const FAR: f64 = f32::MAX as f64;
 /// Distance to focus on where nothing is under the crosshair, units.
 const DEFAULT_FOCUS: f32 = 512.0;
+
+/// Irradiance/π that stands for light without a known source.
+fn ambient_light(scene: &Scene, settings: &Settings, at: &SurfaceHit) -> Vec3 {
+    match settings.ambient {
+        AmbientLight::Off => Vec3::ZERO,
+        AmbientLight::Constant => scene.ambient.constant,
+        AmbientLight::Grid => scene.ambient.volume.at(at.position, at.shading_normal),
+    }
+}
 
 /// Running sums of a pixel in double precision.
 #[derive(Clone, Copy, Default)]
@@ -101,7 +110,8 @@ impl<'a> CpuRenderer<'a> {
         let direct = if surface.albedo == Vec3::ZERO {
             Vec3::ZERO
         } else {
-            surface.albedo * direct_light(self.scene, &self.tracer, settings, &surface, address, counts)
+            let lit = direct_light(self.scene, &self.tracer, settings, &surface, address, counts);
+            surface.albedo * (lit + ambient_light(self.scene, settings, &surface))
         };
         SampleRadiance { direct, emission }
     }
@@ -187,7 +197,7 @@ impl<'a> CpuRenderer<'a> {
         };
         for pixel in pixels {
             let number = |n: u32| if n == NONE { -1.0 } else { n as f32 };
-            let v = |f: fn(&super::surface::SurfaceHit) -> Vec3| pixel.as_ref().map_or([0.0; 3], |(s, _)| f(s).into());
+            let v = |f: fn(&SurfaceHit) -> Vec3| pixel.as_ref().map_or([0.0; 3], |(s, _)| f(s).into());
             aovs.albedo.push(v(|s| s.albedo));
             aovs.normal.push(v(|s| s.shading_normal));
             aovs.geo_normal.push(v(|s| s.geometric_normal));

@@ -1,4 +1,4 @@
-//! Automatic exposure from the image'\''s log-average luminance.
+//! Automatic exposure from the image's log-average luminance.
 //! Shader: `shaders/exposure.comp`.
 
 use super::pass::{Pass, PassContext, Recorder};

@@ -8,6 +8,8 @@ use super::frame_constants::{FrameConstants, Push};
 use super::gbuffer::GBuffer;
 use super::pass::{PassContext, Recorder};
 use super::primary::Primary;
+use super::resample::Resample;
+use super::reuse::Reuse;
 use super::scene_gpu::SceneGpu;
 use super::settings::Settings;
 use super::tone_map::ToneMap;
@@ -27,6 +29,9 @@ pub struct FrameInput {
     pub accumulated: u32,
     /// Share of the way to the wanted exposure that this frame goes; 1 takes it at once.
     pub exposure_blend: f32,
+    /// Let pixels reuse light samples of the frame before and of each other, where the settings want it. Samples of
+    /// different frames then depend on each other: not for frames that are averaged.
+    pub reuse: bool,
     /// Produce the display image.
     pub output: bool,
 }
@@ -36,6 +41,8 @@ pub struct FrameRenderer {
     primary: Primary,
     focus: Focus,
     direct: Direct,
+    resample: Resample,
+    reuse: Reuse,
     composite: Composite,
     exposure: Exposure,
     tone_map: ToneMap,
@@ -59,6 +66,8 @@ impl FrameRenderer {
             primary: Primary::new(&context)?,
             focus: Focus::new(&context)?,
             direct: Direct::new(&context)?,
+            resample: Resample::new(&context)?,
+            reuse: Reuse::new(&context)?,
             composite: Composite::new(&context)?,
             exposure: Exposure::new(&context)?,
             tone_map: ToneMap::new(&context)?,
@@ -79,7 +88,13 @@ impl FrameRenderer {
         slot: usize,
         input: &FrameInput,
     ) -> Result<(), GpuError> {
-        let constants = frame_constants(scene, view, slot, input)?;
+        let mut constants = frame_constants(scene, view, slot, input)?;
+        let reuses = input.reuse && input.settings.reuses();
+        if reuses {
+            constants = view.reservoirs(&scene.device)?.complete(constants, &input.settings);
+        } else if let Some(reservoirs) = &mut view.reservoirs {
+            reservoirs.forget();
+        }
         view.constants[slot].write(0, &[constants])?;
         let mut r = Recorder {
             cmd,
@@ -97,7 +112,13 @@ impl FrameRenderer {
             self.focus.record(&mut r, &view.focus[slot])?;
         }
         self.primary.record(&mut r, &view.focus[slot])?;
-        self.direct.record(&mut r, &view.counters[slot])?;
+        match &view.reservoirs {
+            Some(reservoirs) if reuses => {
+                self.resample.record(&mut r, &view.counters[slot], reservoirs)?;
+                self.reuse.record(&mut r, &view.counters[slot], reservoirs)?;
+            }
+            _ => self.direct.record(&mut r, &view.counters[slot])?,
+        }
         self.composite.record(&mut r)?;
         if input.output {
             self.exposure.record(&mut r, &view.exposure)?;
@@ -139,6 +160,7 @@ fn frame_constants(
         random_lights: s.random_lights,
         light_sampling: s.light_sampling as u32,
         light_candidates: s.candidates,
+        ambient: s.ambient as u32,
         soft_shadows: u32::from(s.soft_shadows),
         antialiasing: u32::from(s.antialiasing),
         illumination: u32::from(s.illumination),

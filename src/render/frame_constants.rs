@@ -19,6 +19,10 @@ pub struct FrameConstants {
     pub light_nodes: u64,
     /// Prefix sums of the lights' weights.
     pub light_weights: u64,
+    pub light_cells: u64,
+    pub cell_entries: u64,
+    pub cell_bounds: u64,
+    pub ambient_cubes: u64,
     pub textures: u64,
     pub mesh_trees: u64,
     pub cwbvh_nodes: u64,
@@ -26,6 +30,9 @@ pub struct FrameConstants {
     pub bvh2_nodes: u64,
     pub bvh2_triangles: u64,
     pub instance_nodes: u64,
+    /// Reservoirs of this frame, and those that the frame before left and this one leaves; 0 where samples are not reused.
+    pub reservoirs: u64,
+    pub reservoir_history: u64,
     pub counters: u64,
     pub exposure: u64,
     pub focus: u64,
@@ -41,6 +48,25 @@ pub struct FrameConstants {
     pub up: [f32; 3],
     /// Width of a pixel's cone at distance 1; 0 reads textures at full resolution.
     pub cone: f32,
+    /// Where the frame before was seen from, which the reservoirs' history belongs to.
+    pub old_eye: [f32; 3],
+    pub old_half_width: f32,
+    pub old_forward: [f32; 3],
+    pub old_half_height: f32,
+    pub old_right: [f32; 3],
+    /// Frames' worth of candidates that history counts at most; 0 without history.
+    pub reuse_history: u32,
+    pub old_up: [f32; 3],
+    /// Neighbours whose samples a pixel reuses.
+    pub reuse_neighbours: u32,
+    /// The volume of unexplained light.
+    pub ambient_origin: [f32; 3],
+    /// 0: none, 1: the constant, 2: the volume.
+    pub ambient: u32,
+    pub ambient_step: [f32; 3],
+    pub ambient_width: u32,
+    pub ambient_constant: [f32; 3],
+    pub ambient_height: u32,
     pub size: [u32; 2],
     pub seed: u32,
     pub sequence: u32,
@@ -63,6 +89,9 @@ pub struct FrameConstants {
     pub fixed_exposure: f32,
     /// Share of the way to the wanted exposure that one frame goes, in the logarithm.
     pub exposure_blend: f32,
+    /// Slots of the hash table of light cells, a power of two, less one.
+    pub cell_mask: u32,
+    pub ambient_depth: u32,
     pub padding: u32,
 }
 

@@ -84,10 +84,13 @@ impl<'a> GpuRenderer<'a> {
         Ok(ViewState::new(&self.scene.device, &self.frames.view_layout, size, 1)?)
     }
 
-    fn submit(&self, view: &mut ViewState, input: &FrameInput) -> Result<(), GpuError> {
-        self.scene
-            .device
-            .submit_once("frame", |cmd| self.frames.record(cmd, None, self.scene, view, 0, input))
+    /// Renders one frame of a view and waits for it.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn frame(&self, view: &mut ViewState, input: &FrameInput) -> Result<(), RenderError> {
+        let device = &self.scene.device;
+        Ok(device.submit_once("frame", |cmd| self.frames.record(cmd, None, self.scene, view, 0, input))?)
     }
 
     /// Takes sample `index` into a view's accumulation of which it is number `accumulated`, counted from 1.
@@ -108,9 +111,10 @@ impl<'a> GpuRenderer<'a> {
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,
+            reuse: false,
             output: false,
         };
-        Ok(self.submit(view, &input)?)
+        self.frame(view, &input)
     }
 
     /// Mean of independent samples `range` of every pixel. `progress` is called with the share done, 0..1.
@@ -170,6 +174,15 @@ impl<'a> GpuRenderer<'a> {
             material: surface.iter().map(|s| number(s[2])).collect(),
         })
     }
+}
+
+/// Radiance of the frame that a view shows, for itself.
+///
+/// # Errors
+/// [`RenderError`] of the device.
+pub fn radiance(view: &ViewState) -> Result<Vec<[f32; 3]>, RenderError> {
+    let pixels = floats(view.gbuffer.composite())?;
+    Ok(pixels.iter().map(|p| [p[0], p[1], p[2]]).collect())
 }
 
 /// The accumulated image of a view after `count` samples.

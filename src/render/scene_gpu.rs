@@ -14,7 +14,7 @@ use crate::gpu::{
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
-use crate::scene::records::{Instance, TextureInfo};
+use crate::scene::records::{Instance, NONE, TextureInfo};
 use ash::vk;
 use std::sync::Arc;
 use thiserror::Error;
@@ -37,6 +37,14 @@ const STAGING: u64 = 32 << 20;
 pub struct LightListBuffers {
     pub rows: Buffer,
     pub runs: Buffer,
+}
+
+/// Where the cubes of unexplained light are, and the constant that may stand for them.
+struct AmbientLayout {
+    origin: [f32; 3],
+    step: [f32; 3],
+    size: [u32; 3],
+    constant: [f32; 3],
 }
 
 /// Buffers of the own traversal.
@@ -71,6 +79,13 @@ pub struct SceneGpu {
     pub lights: Buffer,
     pub light_nodes: Buffer,
     pub light_weights: Buffer,
+    pub light_cells: Buffer,
+    pub cell_entries: Buffer,
+    pub cell_bounds: Buffer,
+    pub ambient_cubes: Buffer,
+    ambient: AmbientLayout,
+    /// Slots of the hash table of light cells less one; [`NONE`] without any.
+    pub cell_mask: u32,
     /// Lights in the tree; suns follow.
     pub finite_lights: u32,
     pub bsp_nodes: Buffer,
@@ -160,6 +175,10 @@ impl SceneGpu {
         let lights = buffer!("lights", &scene.lights.lights, none);
         let light_nodes = buffer!("light nodes", &scene.lights.tree.nodes, none);
         let light_weights = buffer!("light weights", &scene.lights.weights, none);
+        let light_cells = buffer!("light cells", &scene.cells.slots, none);
+        let cell_entries = buffer!("light cell entries", &scene.cells.entries, none);
+        let cell_bounds = buffer!("light cell bounds", &scene.cells.bounds, none);
+        let ambient_cubes = buffer!("ambient cubes", &scene.ambient.volume.cubes, none);
         let bsp_nodes = buffer!("bsp nodes", &scene.bsp_nodes, none);
         let pvs_rows = buffer!("light rows", &scene.rows.pvs.rows, none);
         let pvs_runs = buffer!("light runs", &scene.rows.pvs.runs, none);
@@ -250,6 +269,17 @@ impl SceneGpu {
             lights: take(lights)?,
             light_nodes: take(light_nodes)?,
             light_weights: take(light_weights)?,
+            light_cells: take(light_cells)?,
+            cell_entries: take(cell_entries)?,
+            cell_bounds: take(cell_bounds)?,
+            ambient_cubes: take(ambient_cubes)?,
+            ambient: AmbientLayout {
+                origin: scene.ambient.volume.origin.into(),
+                step: scene.ambient.volume.step.into(),
+                size: scene.ambient.volume.size.into(),
+                constant: scene.ambient.constant.into(),
+            },
+            cell_mask: (scene.cells.slots.len() as u32).checked_sub(1).unwrap_or(NONE),
             finite_lights: scene.lights.tree.finite,
             bsp_nodes: take(bsp_nodes)?,
             texture_infos: take(texture_infos)?,
@@ -295,6 +325,17 @@ impl SceneGpu {
             lights: self.lights.address(),
             light_nodes: self.light_nodes.address(),
             light_weights: self.light_weights.address(),
+            light_cells: self.light_cells.address(),
+            cell_entries: self.cell_entries.address(),
+            cell_bounds: self.cell_bounds.address(),
+            ambient_cubes: self.ambient_cubes.address(),
+            ambient_origin: self.ambient.origin,
+            ambient_step: self.ambient.step,
+            ambient_width: self.ambient.size[0],
+            ambient_height: self.ambient.size[1],
+            ambient_depth: self.ambient.size[2],
+            ambient_constant: self.ambient.constant,
+            cell_mask: self.cell_mask,
             finite_lights: self.finite_lights,
             bsp_nodes: self.bsp_nodes.address(),
             textures: self.texture_infos.address(),

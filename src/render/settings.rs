@@ -21,8 +21,21 @@ pub enum LightSampling {
     Power = 1,
     /// By a tree over the lights, with an eye to distance and both cosines.
     Bvh = 2,
-    /// The tree's candidates resampled by what each would contribute.
-    Reservoir = 3,
+    /// By the light cell of the receiver: by what its surroundings get from each light, as traced when the map was loaded.
+    Cells = 3,
+    /// Candidates by light cell, resampled by what each would contribute.
+    Reservoir = 4,
+}
+
+/// What stands for the light that no light of the scene explains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum AmbientLight {
+    Off = 0,
+    /// The same everywhere.
+    Constant = 1,
+    /// What is left over of the light grid.
+    Grid = 2,
 }
 
 /// What the estimators and the output stage are asked to do.
@@ -37,6 +50,13 @@ pub struct Settings {
     pub light_sampling: LightSampling,
     /// Candidates per random light where they are resampled.
     pub candidates: u32,
+    /// Reuse light samples between pixels and frames, where they are resampled and frames are shown as they come.
+    pub light_reuse: bool,
+    /// Frames' worth of candidates that the history of reuse counts at most.
+    pub reuse_history: u32,
+    /// Neighbours whose samples a pixel reuses.
+    pub reuse_neighbours: u32,
+    pub ambient: AmbientLight,
     /// Sample the lights' area; else their centre.
     pub soft_shadows: bool,
     /// Jitter inside the pixel.
@@ -56,14 +76,28 @@ pub struct Settings {
     pub filter_textures: bool,
 }
 
+impl Settings {
+    /// Whether a frame that is shown as it comes reuses light samples: it takes one random light by resampling.
+    pub fn reuses(&self) -> bool {
+        self.light_reuse
+            && self.light_sampling == LightSampling::Reservoir
+            && self.random_lights == 1
+            && self.illumination
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
             illumination: true,
             cull_lights: 1,
             random_lights: 1,
-            light_sampling: LightSampling::Uniform,
-            candidates: 4,
+            light_sampling: LightSampling::Reservoir,
+            candidates: 2,
+            light_reuse: true,
+            reuse_history: 20,
+            reuse_neighbours: 1,
+            ambient: AmbientLight::Grid,
             soft_shadows: true,
             antialiasing: true,
             aperture: 0.0,

@@ -2,6 +2,7 @@
 
 use super::frame_constants::FrameConstants;
 use super::gbuffer::GBuffer;
+use super::reservoirs::Reservoirs;
 use crate::gpu::{Buffer, DescriptorLayout, Device, GpuError, MemoryKind, Tracker};
 use crate::reference::direct::RayCounts;
 use ash::vk;
@@ -21,6 +22,8 @@ pub struct ViewState {
     pub focus: Vec<Buffer>,
     /// One set of counters per frame in flight, visible to the CPU.
     pub counters: Vec<Buffer>,
+    /// Made when samples are first reused.
+    pub reservoirs: Option<Reservoirs>,
 }
 
 impl ViewState {
@@ -61,7 +64,20 @@ impl ViewState {
             exposure,
             focus,
             counters,
+            reservoirs: None,
         })
+    }
+
+    /// The reservoirs, made if there are none yet.
+    ///
+    /// # Errors
+    /// [`GpuError`], out of memory above all.
+    pub fn reservoirs(&mut self, device: &Arc<Device>) -> Result<&mut Reservoirs, GpuError> {
+        let made = match self.reservoirs.take() {
+            Some(made) => made,
+            None => Reservoirs::new(device, self.gbuffer.size)?,
+        };
+        Ok(self.reservoirs.insert(made))
     }
 
     /// Reads and clears the counters of a frame that has ended.

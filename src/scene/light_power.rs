@@ -1,6 +1,6 @@
 //! How strong lights are beside each other: the weights by which they are chosen.
 
-use super::records::{LIGHT_DOME, LIGHT_LINEAR, LIGHT_SPHERE, LIGHT_SUN, LIGHT_TRIANGLE, Light};
+use super::records::{LIGHT_DOME, LIGHT_EVEN, LIGHT_LINEAR, LIGHT_SPHERE, LIGHT_SUN, LIGHT_TRIANGLE, Light};
 use std::f32::consts::{FRAC_1_PI, FRAC_2_PI};
 
 /// Weight of all lights together. Integers make prefix sums exact at any number of lights; as a power of two it lets a
@@ -21,6 +21,7 @@ pub fn strength(light: &Light) -> f32 {
     let l = luminance(light.radiance);
     let s = match light.kind {
         LIGHT_TRIANGLE => l * light.size * FRAC_1_PI,
+        LIGHT_DOME if light.flags & LIGHT_EVEN != 0 => l * light.size * FRAC_1_PI,
         // The dome's radiance is V/(255·π·cos elevation): on average over a hemisphere as strong as V/255 · 2/π.
         LIGHT_DOME => l * light.size * FRAC_1_PI * FRAC_2_PI,
         LIGHT_SPHERE if light.flags & LIGHT_LINEAR != 0 => l * light.p2[2] * TYPICAL_DISTANCE * TYPICAL_DISTANCE,
@@ -29,6 +30,12 @@ pub fn strength(light: &Light) -> f32 {
         _ => 0.0,
     };
     if s.is_finite() { s.max(0.0) } else { 0.0 }
+}
+
+/// Strength that a weight of 1 stands for.
+pub fn strength_of_one(lights: &[Light]) -> f32 {
+    let total: f64 = lights.iter().map(|l| f64::from(strength(l))).sum();
+    (total / f64::from(TOTAL_WEIGHT)) as f32
 }
 
 /// Prefix sums of the lights' weights, one more than there are lights. Every light weighs 1 at least.

@@ -1,12 +1,12 @@
 //! The lights that a map's files describe: emissive surfaces, light entities, suns and skies, in luxel units.
 
 use super::clusters::{ClusterMap, ClusterSet, LightReach};
-use super::light_power::weight_sums;
+use super::light_power::{strength_of_one, weight_sums};
 use super::light_tree::LightTree;
 use super::material::{MaterialSource, Visibility};
 use super::records::{
-    LIGHT_DOME, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE, LIGHT_TWO_SIDED,
-    Light, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
+    LIGHT_DOME, LIGHT_EVEN, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE,
+    LIGHT_TWO_SIDED, Light, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
 };
 use super::static_geometry::Geometry;
 use crate::assets::bsp::{Bounds, Bsp};
@@ -37,6 +37,8 @@ pub enum LightSource {
     EmissiveSprite,
     Sun,
     SkyDome,
+    /// Sky that no script explains, of the same radiance everywhere.
+    RecoveredSky,
     /// Found in the lightmaps, or in a lights file.
     Recovered,
 }
@@ -51,6 +53,8 @@ pub struct LightTable {
     pub tree: LightTree,
     /// Prefix sums of the lights' weights by power; one more than there are lights.
     pub weights: Vec<u32>,
+    /// Strength ([`super::light_power::strength`]) that a weight of 1 stands for.
+    pub strength_of_one: f32,
 }
 
 const BLANK: Light = Light {
@@ -65,7 +69,7 @@ const BLANK: Light = Light {
     p2: [0.0; 3],
     padding: 0,
     radiance: [0.0; 3],
-    padding2: 0,
+    scale: 1.0,
 };
 
 /// Everything that the collection of lights looks at.
@@ -113,13 +117,41 @@ impl LightTable {
         table
     }
 
+    /// Adds the same radiance behind every sky surface.
+    pub fn add_even_sky(&mut self, inputs: &LightInputs, radiance: Vec3) {
+        for_sky_triangles(inputs, |corners, surface, moves| {
+            let dome = Dome {
+                source: LightSource::RecoveredSky,
+                radiance,
+                flags: LIGHT_TWO_SIDED | LIGHT_EVEN,
+            };
+            self.add_dome(inputs, &dome, corners, surface, moves);
+        });
+    }
+
+    /// Leaves out the lights that are not wanted, and multiplies what the others give by a factor.
+    pub fn scaled(&self, scale: impl Fn(usize) -> f32) -> Self {
+        let mut out = Self::default();
+        for i in 0..self.lights.len() {
+            let s = scale(i);
+            if s > 0.0 {
+                let mut light = self.lights[i];
+                light.radiance = light.radiance.map(|r| r * s);
+                light.scale *= s;
+                out.push(self.sources[i], light, self.reach[i].clone());
+            }
+        }
+        out
+    }
+
     /// Builds the tree and the weights, and brings the lights into the tree's order.
-    fn put_in_order(&mut self) {
+    pub fn put_in_order(&mut self) {
         let (tree, order) = LightTree::build(&self.lights);
         self.lights = order.iter().map(|&i| self.lights[i as usize]).collect();
         self.sources = order.iter().map(|&i| self.sources[i as usize]).collect();
         self.reach = order.iter().map(|&i| self.reach[i as usize].clone()).collect();
         self.weights = weight_sums(&self.lights);
+        self.strength_of_one = strength_of_one(&self.lights);
         self.tree = tree;
     }
 
@@ -329,30 +361,35 @@ impl LightTable {
             }
             if let Some(value) = source.sky_light {
                 let radiance = source.emission_colour() * (value / 255.0);
+                let dome = Dome {
+                    source: LightSource::SkyDome,
+                    radiance,
+                    flags: LIGHT_TWO_SIDED,
+                };
                 for_sky_triangles(inputs, |corners, surface, moves| {
-                    self.add_dome(inputs, radiance, corners, surface, moves);
+                    self.add_dome(inputs, &dome, corners, surface, moves);
                 });
             }
         }
     }
 
     /// The part of a dome that is seen through a sky triangle, whose sides are both windows.
-    fn add_dome(&mut self, inputs: &LightInputs, radiance: Vec3, [a, b, c]: [Vec3; 3], surface: u32, moves: bool) {
+    fn add_dome(&mut self, inputs: &LightInputs, dome: &Dome, [a, b, c]: [Vec3; 3], surface: u32, moves: bool) {
         let area = (b - a).cross(c - a).length() * 0.5;
         if !(area > 0.0 && area.is_finite()) {
             return;
         }
         let clusters = clusters_of_triangle(inputs, [a, b, c], surface, moves);
         self.push(
-            LightSource::SkyDome,
+            dome.source,
             Light {
                 kind: LIGHT_DOME,
-                flags: LIGHT_TWO_SIDED,
+                flags: dome.flags,
                 p0: a.into(),
                 size: area,
                 p1: (b - a).into(),
                 p2: (c - a).into(),
-                radiance: radiance.into(),
+                radiance: dome.radiance.into(),
                 ..BLANK
             },
             LightReach {
@@ -361,6 +398,13 @@ impl LightTable {
             },
         );
     }
+}
+
+/// What is behind sky surfaces.
+struct Dome {
+    source: LightSource,
+    radiance: Vec3,
+    flags: u32,
 }
 
 /// Clusters that a placed triangle touches; of a mover, those around it.

@@ -1,7 +1,9 @@
 //! From a map's files to a scene.
 
+use super::ambient::Ambient;
 use super::clusters::{ClusterMap, LightRows, bsp_records, build_light_rows};
 use super::entity_geometry::{self, Placement};
+use super::light_cells::LightCells;
 use super::lights::{LightInputs, LightTable};
 use super::material::MaterialSource;
 use super::records::{BspNode, Material};
@@ -14,6 +16,7 @@ use crate::assets::image::Texture;
 use crate::assets::shader_script::ShaderLibrary;
 use crate::assets::vfs::search_path::map_path;
 use crate::assets::vfs::{FileSource, VfsError};
+use glam::Affine3A;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -44,6 +47,10 @@ pub struct Scene {
     pub lights: LightTable,
     pub clusters: ClusterMap,
     pub rows: LightRows,
+    /// What no light of the scene explains; nothing until [`crate::lighting::light`] has looked for it.
+    pub ambient: Ambient,
+    /// Empty until [`crate::reference::light_cells::build`] has made them.
+    pub cells: LightCells,
     pub bsp_nodes: Vec<BspNode>,
     /// What is missing or damaged, one sentence each, each once.
     pub warnings: Vec<String>,
@@ -135,10 +142,7 @@ impl Scene {
             .and_then(|w| w.number("_farplanedist"))
             .filter(|&far| far > 0.0);
         let clusters = ClusterMap::new(&bsp, far_plane);
-        let mut mesh_placements = vec![None; geometry.meshes.len()];
-        for p in &placements {
-            mesh_placements[p.mesh as usize].get_or_insert(p.object_to_world);
-        }
+        let mesh_placements = first_placements(&placements, geometry.meshes.len());
         let lights = LightTable::collect(&LightInputs {
             bsp: &bsp,
             entities: &entities,
@@ -167,8 +171,48 @@ impl Scene {
             lights,
             clusters,
             rows,
+            ambient: Ambient::default(),
+            cells: LightCells::default(),
             warnings,
             timings: watch.timings,
         })
     }
+
+    /// Where each mesh stands first; `None` where no entity places it.
+    pub fn mesh_placements(&self) -> Vec<Option<Affine3A>> {
+        first_placements(&self.placements, self.geometry.meshes.len())
+    }
+
+    /// What the collection of lights looks at. `placements`: [`Self::mesh_placements`].
+    pub fn light_inputs<'a>(&'a self, placements: &'a [Option<Affine3A>]) -> LightInputs<'a> {
+        LightInputs {
+            bsp: &self.bsp,
+            entities: &self.entities,
+            geometry: &self.geometry,
+            placements,
+            sources: &self.material_sources,
+            materials: &self.materials,
+            clusters: &self.clusters,
+        }
+    }
+
+    /// Gives the scene other lights, in any order, and lists them anew. Light cells and ambient light are gone then.
+    pub fn relight(&mut self, mut lights: LightTable) {
+        lights.put_in_order();
+        self.rows = build_light_rows(&self.clusters, &lights.reach, &lights.weights);
+        for t in &mut self.geometry.triangles {
+            t.fallback_row = self.rows.surface_row[t.surface as usize];
+        }
+        self.lights = lights;
+        self.cells = LightCells::default();
+        self.ambient = Ambient::default();
+    }
+}
+
+fn first_placements(placements: &[Placement], meshes: usize) -> Vec<Option<Affine3A>> {
+    let mut first = vec![None; meshes];
+    for p in placements {
+        first[p.mesh as usize].get_or_insert(p.object_to_world);
+    }
+    first
 }

@@ -1,10 +1,12 @@
 //! What is rendered: triangles, materials, lights, clusters and views.
 
+pub mod ambient;
 pub mod bvh;
 pub mod camera;
 pub mod clusters;
 pub mod emission;
 pub mod entity_geometry;
+pub mod light_cells;
 pub mod light_power;
 pub mod light_tree;
 pub mod lights;

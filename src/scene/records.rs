@@ -93,6 +93,8 @@ pub const LIGHT_LINEAR: u32 = 2;
 pub const LIGHT_SPOT: u32 = 4;
 /// `Light::flags`: no cosine at the receiver (light entities with the respective spawn flag).
 pub const LIGHT_NO_COSINE: u32 = 8;
+/// A dome of the same radiance in all directions, below the horizon too.
+pub const LIGHT_EVEN: u32 = 16;
 
 /// A light. Meaning of the vectors by kind:
 ///
@@ -118,7 +120,8 @@ pub struct Light {
     pub p2: [f32; 3],
     pub padding: u32,
     pub radiance: [f32; 3],
-    pub padding2: u32,
+    /// What the material's emission is multiplied by; triangles only.
+    pub scale: f32,
 }
 
 /// Inner node of the map's BSP for receiver classification.
@@ -176,6 +179,41 @@ pub struct LightNode {
     pub count: u32,
     /// The right child; 0 in a leaf, which holds one light.
     pub right: u32,
+}
+
+/// Irradiance/π by unexplained light at a point, luxel units: see [`super::ambient`].
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct AmbientCube {
+    /// For normals along +x, −x, +y, −y, +z, −z.
+    pub axes: [[f32; 3]; 6],
+    /// 1 where the point is in the open, 0 in solid.
+    pub open: f32,
+}
+
+/// A slot of the hash table of light cells: receivers of one light row, in one cube of space, that face one way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightCell {
+    /// Light row of the receivers.
+    pub row: u32,
+    /// Cube and facing.
+    pub place: u32,
+    /// Its entries; a slot without any is empty.
+    pub first: u32,
+    pub count: u32,
+}
+
+/// One choice of a light cell: a light, or a range of lights by power.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct CellEntry {
+    pub first_light: u32,
+    pub light_count: u32,
+    /// Probability of the entry; of one of its lights, that times its share of `weight`.
+    pub probability: f32,
+    /// Weight of all its lights by power.
+    pub weight: u32,
 }
 
 /// Size of a texture in pixels, and its number of mip levels.

@@ -31,6 +31,11 @@ pub const DIM_CANDIDATE_PICK: u32 = 0x1000;
 pub const DIM_CANDIDATE_POINT: u32 = 0x2000;
 /// Most candidates per random light.
 pub const MAX_CANDIDATES: u32 = 32;
+/// Reuse of samples: whether the old one is taken; then which neighbours are asked, four of them, and whether theirs are
+/// taken.
+pub const DIM_REUSE: u32 = 0x3000;
+/// Which candidate is kept where samples are reused.
+pub const DIM_REUSE_KEEP: u32 = 0x3100;
 /// Position on light number i when all lights are sampled; everything from here up belongs to it.
 pub const DIM_EVERY_LIGHT: u32 = 0x1_0000;
 

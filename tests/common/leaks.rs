@@ -3,7 +3,7 @@
 use glam::Vec3;
 use q3rays::assets::bsp::Bsp;
 use q3rays::reference::CpuRenderer;
-use q3rays::reference::direct::{SampleAddress, light_row};
+use q3rays::reference::direct::{SampleAddress, light_row, point_sampling};
 use q3rays::reference::light_sample::{Target, sample_light};
 use q3rays::reference::surface::{offset_point, surface_at};
 use q3rays::render::settings::Settings;
@@ -78,7 +78,7 @@ pub fn explain(cpu: &CpuRenderer, camera: &Camera, size: (u32, u32), settings: &
         let k = key(settings.seed, address.pixel, DIM_EVERY_LIGHT + light);
         let u = sample2(settings.sequence, k, address.index);
         let record = &scene.lights.lights[light as usize];
-        let Some(sample) = sample_light(scene, record, &at, u, settings.soft_shadows) else {
+        let Some(sample) = sample_light(scene, record, &at, u, point_sampling(settings)) else {
             continue;
         };
         // Suns and skies are in every row: one that is not is a bug, wherever its rays pass.

@@ -11,6 +11,7 @@ use glam::Vec3;
 use q3rays::assets::bsp::build::fixtures::Fixture;
 use q3rays::assets::vfs::{FileSource, Install, Vfs, VfsError};
 use q3rays::content::embedded::EMBEDDED;
+use q3rays::reference::light_cells;
 use q3rays::render::film::Film;
 use q3rays::render::gpu_renderer::GpuRenderer;
 use q3rays::render::scene_gpu::SceneGpu;
@@ -51,8 +52,10 @@ pub fn installed() -> Vfs {
 
 /// An installed (or the shipped) map as a scene.
 pub fn real(name: &str) -> Scene {
-    Scene::load(&installed().focused_on(name), name)
-        .unwrap_or_else(|e| panic!("{e}: OpenArena's maps are needed, run tests/setup.sh"))
+    let mut scene = Scene::load(&installed().focused_on(name), name)
+        .unwrap_or_else(|e| panic!("{e}: OpenArena's maps are needed, run tests/setup.sh"));
+    light_cells::fill(&mut scene);
+    scene
 }
 
 /// The view from a spawn point, moved and turned off whole numbers: along seams between coplanar faces and on

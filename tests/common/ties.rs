@@ -3,14 +3,12 @@
 
 use glam::Vec3;
 use q3rays::reference::CpuRenderer;
-use q3rays::reference::direct::{RayCounts, SampleAddress, direct_light, light_row};
-use q3rays::reference::light_choice::choose;
+use q3rays::reference::direct::{RayCounts, SampleAddress, Taken, direct_light, point_sampling, taken_sample};
 use q3rays::reference::light_sample::{Target, sample_light};
 use q3rays::reference::surface::{SurfaceHit, classify, emission_seen, offset_point, surface_at};
 use q3rays::render::settings::Settings;
 use q3rays::scene::camera::Camera;
 use q3rays::scene::records::NONE;
-use q3rays::scene::sampling::{DIM_LIGHT_PICK, DIM_LIGHT_POINT, bits2, key, sample2};
 use std::collections::BTreeMap;
 
 /// What a sample that differs was.
@@ -134,19 +132,14 @@ impl Context<'_> {
         })
     }
 
-    /// The i-th light that is chosen for a receiver, with the number that chooses moved by as many steps of a float.
-    fn chosen(&self, at: &SurfaceHit, address: SampleAddress, i: u32, steps: i32) -> Option<u32> {
-        let (scene, settings) = (self.cpu.scene, &self.settings);
-        let (lists, row) = light_row(scene, settings, at.row);
-        let k = key(settings.seed, address.pixel, DIM_LIGHT_PICK + i);
-        let [bits, _] = bits2(settings.sequence, k, address.index);
-        let bits = bits.saturating_add_signed(steps << 8);
-        choose(settings.light_sampling, &scene.lights, lists, row, at, bits).map(|c| c.light)
+    /// The i-th light sample that is taken for a receiver, with the numbers that choose moved by as many steps of a float.
+    fn taken(&self, at: &SurfaceHit, address: SampleAddress, i: u32, steps: i32) -> Option<Taken> {
+        taken_sample(self.cpu.scene, &self.cpu.tracer, &self.settings, at, address, i, steps)
     }
 
     fn choice_tie(&self, at: &SurfaceHit, address: SampleAddress) -> bool {
         (0..self.settings.random_lights).any(|i| {
-            let chosen = |steps| self.chosen(at, address, i, steps);
+            let chosen = |steps| self.taken(at, address, i, steps).map(|t| (t.light, t.u));
             (-8..=8).any(|steps| chosen(steps) != chosen(0))
         })
     }
@@ -154,17 +147,9 @@ impl Context<'_> {
     /// Whether moving the end of one of the random lights' shadow rays changes what it meets.
     fn contact(&self, at: &SurfaceHit, address: SampleAddress) -> bool {
         let (scene, settings) = (self.cpu.scene, &self.settings);
-        let numbers = |dimension| {
-            let k = key(settings.seed, address.pixel, dimension);
-            sample2(settings.sequence, k, address.index)
-        };
         let origin = offset_point(at.position, at.geometric_normal);
         (0..settings.random_lights).any(|i| {
-            let Some(light) = self.chosen(at, address, i, 0) else {
-                return false;
-            };
-            let light = &scene.lights.lights[light as usize];
-            let sample = sample_light(scene, light, at, numbers(DIM_LIGHT_POINT + i), settings.soft_shadows);
+            let sample = self.taken(at, address, i, 0).and_then(|t| t.sample);
             let Some(Target::Point(end)) = sample.map(|s| s.target) else {
                 return false;
             };
@@ -178,15 +163,13 @@ impl Context<'_> {
     fn texel(&self, at: &SurfaceHit, address: SampleAddress, ratio: Vec3) -> bool {
         let (scene, settings) = (self.cpu.scene, &self.settings);
         (0..settings.random_lights).any(|i| {
-            let Some(light) = self.chosen(at, address, i, 0) else {
+            let Some(Taken { light, u, .. }) = self.taken(at, address, i, 0) else {
                 return false;
             };
             let light = &scene.lights.lights[light as usize];
-            let k = key(settings.seed, address.pixel, DIM_LIGHT_POINT + i);
-            let u = sample2(settings.sequence, k, address.index);
             let value = |offset: Vec3| {
                 let u = [u[0] + offset.x * LIGHT_POINT, u[1] + offset.y * LIGHT_POINT].map(|u| u.clamp(0.0, 1.0));
-                sample_light(scene, light, at, u, settings.soft_shadows).map_or(Vec3::ZERO, |s| s.value)
+                sample_light(scene, light, at, u, point_sampling(settings)).map_or(Vec3::ZERO, |s| s.value)
             };
             let (low, high) = around()
                 .map(value)
