@@ -106,7 +106,7 @@ fn every_map_renders_at_every_spawn() {
     assert!(failures.is_empty(), "{failures:#?}");
     if std::env::var_os("Q3RAYS_UPDATE_DOCS").is_some() {
         let head = format!(
-            "# Every map\n\nMade by `Q3RAYS_UPDATE_DOCS=1 cargo test --release --test all_maps -- --ignored`: all maps found, each \
+            "# Every map\n\nMade by `Q3RAYS_UPDATE_DOCS=1 cargo test --release --test all_maps -- --ignored`: all maps found, with the lights that their files describe (`rt_lights known`), each \
              rendered at every spawn point at {}x{} on the CPU tracer with {LIGHTS} random lights (`rt_lightSampling bvh`) and {SAMPLES} samples a pixel. \
              *Black* is the share of pixels without any radiance (noise included), *mean* the mean radiance in luxel units, \
              *in cluster at 0.25*, *by leafs* and *all lights* say how receivers find their light list \

@@ -66,14 +66,7 @@ pub fn direct_light(
     address: SampleAddress,
     counts: &mut RayCounts,
 ) -> Vec3 {
-    let estimator = Estimator {
-        scene,
-        tracer,
-        settings,
-        at,
-        address,
-        points: point_sampling(settings),
-    };
+    let estimator = Estimator::new(scene, tracer, settings, at, address);
     let (lists, row) = light_row(scene, settings, at.row);
     if settings.random_lights == 0 {
         return lists
@@ -81,9 +74,10 @@ pub fn direct_light(
             .map(|light| estimator.one(light, DIM_EVERY_LIGHT + light, 1.0, counts))
             .sum();
     }
+    let chances = estimator.chances();
     let share = 1.0 / settings.random_lights as f32;
     (0..settings.random_lights)
-        .map(|i| match estimator.taken(&estimator.chances(), i, 0) {
+        .map(|i| match estimator.taken(&chances, i, 0) {
             Some(taken) => estimator.traced(taken.sample, taken.weight * share, counts),
             None => Vec3::ZERO,
         })
@@ -113,14 +107,7 @@ pub fn taken_sample(
     i: u32,
     steps: i32,
 ) -> Option<Taken> {
-    let estimator = Estimator {
-        scene,
-        tracer,
-        settings,
-        at,
-        address,
-        points: point_sampling(settings),
-    };
+    let estimator = Estimator::new(scene, tracer, settings, at, address);
     estimator.taken(&estimator.chances(), i, steps)
 }
 
@@ -133,7 +120,24 @@ struct Estimator<'a> {
     points: PointSampling,
 }
 
-impl Estimator<'_> {
+impl<'a> Estimator<'a> {
+    fn new(
+        scene: &'a Scene,
+        tracer: &'a Tracer,
+        settings: &'a Settings,
+        at: &'a SurfaceHit,
+        address: SampleAddress,
+    ) -> Self {
+        Self {
+            scene,
+            tracer,
+            settings,
+            at,
+            address,
+            points: point_sampling(settings),
+        }
+    }
+
     fn bits(&self, dimension: u32) -> [u32; 2] {
         let key = key(self.settings.seed, self.address.pixel, dimension);
         bits2(self.settings.sequence, key, self.address.index)
