@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Changes whenever the same map would give other lights than before.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Why there are no lights.
 #[derive(Debug, Error)]

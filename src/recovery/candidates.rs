@@ -1,7 +1,7 @@
 //! Where lights might be: in front of luxels that are brighter than what is known explains.
 
 use super::fit::{Entry, support};
-use super::point::{Placed, Search};
+use super::point::{LEAST_SUPPORT, Placed, Search};
 use super::random::Random;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,12 +12,8 @@ const NEAR: f32 = 10.0;
 const FAR: f32 = 320.0;
 /// Edge of the cells in which one candidate is kept, units.
 const CELL: f32 = 32.0;
-/// Rows looked at per candidate.
-const ROWS: f32 = 250.0;
 /// Draws per candidate wanted.
 const DRAWS: usize = 6;
-/// Rows that a light must be carried by.
-const LEAST_SUPPORT: f32 = 5.0;
 
 /// A place and what a light there would give a sample of rows.
 pub struct Candidate {
@@ -26,6 +22,11 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// What a light here would give a sample of rows at power 1.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
     /// What a light here would save against a residual.
     pub fn gain(&self, search: &Search, residual: &[Vec3]) -> Placed {
         let (power, gain) = super::fit::single(search.rows, &self.entries, |row| residual[row]);
@@ -37,8 +38,15 @@ impl Candidate {
     }
 }
 
-/// Draws up to `count` candidates before rows chosen with probability proportional to `weight`.
-pub fn draw(search: &Search, count: usize, round: u32, weight: impl Fn(usize) -> f32) -> Vec<Candidate> {
+/// Draws up to `count` candidates before rows chosen with probability proportional to `weight`, and looks at about
+/// `per_candidate` rows for each.
+pub fn draw(
+    search: &Search,
+    count: usize,
+    per_candidate: f32,
+    round: u32,
+    weight: impl Fn(usize) -> f32,
+) -> Vec<Candidate> {
     let mut random = Random::new(search.seed, 0x4341, round);
     let mut cumulative = Vec::with_capacity(search.luxels.len());
     let mut total = 0.0f64;
@@ -69,7 +77,7 @@ pub fn draw(search: &Search, count: usize, round: u32, weight: impl Fn(usize) ->
         .enumerate()
         .filter_map(|(i, position)| {
             let mut random = Random::new(search.seed, 0x4342 + round, i as u32);
-            let subset = search.subset(position, ROWS, 0.0, &mut random);
+            let subset = search.subset(position, per_candidate, 0.0, &mut random);
             let mut entries = search.entries(position, &subset);
             entries.retain(|e| e.value > 0.0);
             (support(search.rows, &entries) >= LEAST_SUPPORT).then_some(Candidate { position, entries })

@@ -1,14 +1,20 @@
 //! Robust non-negative least squares over luxels: the residual, its weights, and coordinate descent.
 //!
-//! A row is a luxel. Its error has the scale 8 + 0.15·stored byte units, errors beyond three of these count linearly
-//! (Huber), and a clamped luxel is a lower bound: predictions above it cost nothing.
+//! A row is a luxel. Its error has the scale 4 + 0.15·stored byte units (less than 4 on maps that are mostly darker than
+//! twice that), errors beyond three of these count linearly (Huber), and a clamped luxel is a lower bound: predictions above
+//! it cost nothing.
 
 use super::luxels::Luxel;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Error scale of dark luxels, luxel units, and its growth with what is stored.
+/// Error scale of dark luxels, luxel units: at most this, and at most `DARK_SHARE` of what is typical, since bakes with
+/// a high gamma tell values apart that are far below a byte of the others.
 const ERROR_FLOOR: f32 = 4.0 / 255.0;
+const DARK_SHARE: f32 = 0.5;
+/// But not less than this, luxel units.
+const LEAST_FLOOR: f32 = 0.25 / 255.0;
+/// Growth of the error scale with what is stored.
 const ERROR_SHARE: f32 = 0.15;
 /// Scaled error beyond which it counts linearly.
 const HUBER: f32 = 3.0;
@@ -26,9 +32,10 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Rows of luxels; every fourth one of a list in no particular order judges.
-    pub fn new(luxels: &[Luxel], train: Vec<bool>) -> Self {
-        let weight = |l: &Luxel| (ERROR_FLOOR + ERROR_SHARE * l.stored.element_sum() / 3.0).recip();
+    /// Rows of luxels. `typical` is what the map's median luxel stores, luxel units.
+    pub fn new(luxels: &[Luxel], typical: f32, train: Vec<bool>) -> Self {
+        let floor = (DARK_SHARE * typical).clamp(LEAST_FLOOR, ERROR_FLOOR);
+        let weight = |l: &Luxel| (floor + ERROR_SHARE * l.stored.element_sum() / 3.0).recip();
         Self {
             target: luxels.iter().map(|l| l.stored).collect(),
             weight: luxels.iter().map(weight).collect(),

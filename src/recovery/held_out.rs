@@ -37,7 +37,7 @@ impl<'a> HeldOut<'a> {
         let lights: Vec<Column> = found
             .par_iter()
             .map(|f| {
-                let (rows, mut values) = column(occluders, luxels, f.position, reach(f.power));
+                let (rows, mut values) = column(occluders, luxels, f.position, reach(f.power), f.cone.as_ref());
                 values
                     .iter_mut()
                     .zip(&rows)

@@ -101,6 +101,21 @@ pub fn all(scene: &Scene, encoding: &Encoding) -> Vec<Luxel> {
         .collect()
 }
 
+/// What half of the area stores less than, mean of the channels, luxel units.
+pub fn median_stored(luxels: &[Luxel]) -> f32 {
+    let mut sorted: Vec<(f32, f32)> = luxels.iter().map(|l| (l.stored.element_sum() / 3.0, l.area)).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * sorted.iter().map(|(_, area)| f64::from(*area)).sum::<f64>();
+    let mut below = 0.0;
+    for (stored, area) in sorted {
+        below += f64::from(area);
+        if below >= half {
+            return stored;
+        }
+    }
+    0.0
+}
+
 /// Calls `visit` with each luxel (column, row) whose centre is in a triangle of page coordinates, the weights of the second
 /// and third corner there, and their change per column and row.
 fn in_triangle([a, b, c]: [Vec2; 3], mut visit: impl FnMut(usize, usize, [f32; 2], [[f32; 2]; 2])) {

@@ -26,6 +26,7 @@ pub mod recover;
 pub mod scene_lights;
 pub mod score;
 pub mod solve;
+pub mod spot;
 pub mod visibility;
 
 pub use lights_file::{LightsFile, LightsFileError};

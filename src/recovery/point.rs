@@ -3,6 +3,7 @@
 use super::fit::{Column, Entry, Rows, single, support};
 use super::luxels::Luxel;
 use super::random::Random;
+use super::spot::Cone;
 use super::visibility::Occluders;
 use crate::scene::clusters::cluster_at;
 use glam::Vec3;
@@ -47,7 +48,7 @@ pub struct Placed {
 }
 
 /// Rows that a light must be carried by.
-const LEAST_SUPPORT: f32 = 5.0;
+pub const LEAST_SUPPORT: f32 = 5.0;
 /// Rows looked at per light while it is placed.
 const REFINE_ROWS: f32 = 500.0;
 /// Least cosine with which a row counts when the light may still move.
@@ -61,7 +62,12 @@ impl Search<'_> {
 
     /// The whole column of a light of about a power.
     pub fn column(&self, position: Vec3, power: Vec3) -> Column {
-        let (rows, mut values) = column(self.occluders, self.luxels, position, reach(power));
+        self.shaped_column(position, None, reach(power))
+    }
+
+    /// The same with a reach of its own, and a cone for a spot.
+    pub(super) fn shaped_column(&self, position: Vec3, cone: Option<&Cone>, reach: f32) -> Column {
+        let (rows, mut values) = column(self.occluders, self.luxels, position, reach, cone);
         values
             .iter_mut()
             .zip(&rows)
@@ -218,8 +224,15 @@ pub fn reach(power: Vec3) -> f32 {
     (7500.0 * power.max_element()).sqrt()
 }
 
-/// Rows that a light reaches and its irradiance there at power 1.
-pub fn column(occluders: &Occluders, luxels: &[Luxel], position: Vec3, reach: f32) -> (Vec<u32>, Vec<f32>) {
+/// Rows that a light reaches and its irradiance there at power 1. `cone` makes a spot of it.
+pub fn column(
+    occluders: &Occluders,
+    luxels: &[Luxel],
+    position: Vec3,
+    reach: f32,
+    cone: Option<&Cone>,
+) -> (Vec<u32>, Vec<f32>) {
+    let given = |l: &Luxel| unshadowed(l, position) * cone.map_or(1.0, |c| c.part(l.position - position));
     let scene = occluders.scene;
     let Some(cluster) = cluster_at(&scene.bsp_nodes, position) else {
         return (Vec::new(), Vec::new());
@@ -232,11 +245,10 @@ pub fn column(occluders: &Occluders, luxels: &[Luxel], position: Vec3, reach: f3
             if !visible.contains(luxel.cluster) || luxel.position.distance_squared(position) > reach * reach {
                 return None;
             }
-            let value = unshadowed(luxel, position);
-            if value <= FAINT {
+            if given(luxel) <= FAINT {
                 return None;
             }
-            let lit = occluders.lit(luxel, position, |l| unshadowed(l, position));
+            let lit = occluders.lit(luxel, position, given);
             (lit > 0.0).then_some((row as u32, lit))
         })
         .unzip()

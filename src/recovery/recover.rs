@@ -225,6 +225,7 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
         });
     }
     let (luxels, fitted) = sample(&all, options);
+    let typical = luxels::median_stored(&all);
     drop(all);
     timer.lap("luxels");
     let occluders = Occluders::new(scene);
@@ -243,6 +244,7 @@ pub fn recover(scene: &Scene, options: &Options, progress: &(dyn Fn(f32) + Sync)
     let mut random = Random::new(options.seed, 0x5456, 0);
     let mut rows = Rows::new(
         fit_luxels,
+        typical,
         (0..fitted).map(|_| !random.bits().is_multiple_of(4)).collect(),
     );
     let mut terms = terms(&occluders, &luxels, options.hide_entities, hurried(scene), options.seed);

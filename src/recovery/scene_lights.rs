@@ -1,8 +1,9 @@
 //! Recovered lights as lights of a scene.
 
 use super::known::{in_lights_file, light_terms};
-use super::lights_file::{FileLight, LightsFile, Scale};
+use super::lights_file::{FileLight, LightsFile, Scale, Spot};
 use super::recover::Recovery;
+use super::spot::Cone;
 use crate::assets::bsp::Bounds;
 use crate::scene::Scene;
 use crate::scene::clusters::LightReach;
@@ -38,6 +39,16 @@ pub fn sphere(light: &FileLight) -> Light {
         padding: 0,
         radiance: (light.color * (POINT_SCALE * light.photons / (radius * radius))).into(),
         scale: 1.0,
+    }
+}
+
+/// A cone as light entities say it.
+fn spot(position: Vec3, cone: &Cone) -> Spot {
+    // Any distance would do that leaves a radius after the compiler's margin is taken off.
+    let distance = (2.0 * CONE_MARGIN / cone.slope).max(128.0);
+    Spot {
+        target: position + cone.axis * distance,
+        cone: distance * cone.slope - CONE_MARGIN,
     }
 }
 
@@ -97,7 +108,7 @@ impl From<&Recovery> for LightsFile {
                     photons: l.power.max_element(),
                     color: l.power / l.power.max_element(),
                     radius: None,
-                    spot: None,
+                    spot: l.cone.map(|c| spot(l.position, &c)),
                     share: Some(l.share as f32),
                 })
                 .collect(),

@@ -3,6 +3,7 @@
 use super::candidates::{Candidate, draw};
 use super::fit::{Column, Model};
 use super::point::{Placed, Search};
+use super::spot::Cone;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -21,6 +22,8 @@ pub struct Limits {
 const APART: f32 = 160.0;
 /// Nothing is picked within this distance of a place that made things worse, units.
 const TABU: f32 = 48.0;
+/// Rows looked at per candidate.
+const CANDIDATE_ROWS: f32 = 250.0;
 /// Rounds between new candidates, and between rounds over all lights.
 const REDRAW: usize = 4;
 const CYCLE: usize = 6;
@@ -42,6 +45,8 @@ pub struct Found {
     /// Share of the cost that would come back without it; of a finished recovery, share of the stored light that it gives, on
     /// luxels never fitted.
     pub share: f64,
+    /// What a spot lights; `None`: all around.
+    pub cone: Option<Cone>,
 }
 
 /// The model of a search: `fixed` known columns, then one per light.
@@ -50,6 +55,8 @@ pub struct Solver<'a> {
     pub(super) model: Model,
     pub(super) fixed: usize,
     pub(super) places: Vec<Vec3>,
+    /// One per place once spots were added, none before.
+    pub(super) cones: Vec<Option<Cone>>,
     limits: Limits,
     /// Cost that a light must save to stay.
     pub(super) least: f64,
@@ -65,6 +72,7 @@ impl<'a> Solver<'a> {
             fixed: model.columns.len(),
             model,
             places: Vec::new(),
+            cones: Vec::new(),
             limits,
             least: limits.pays * rows.total_cost(&rows.target),
             label: 0,
@@ -75,18 +83,19 @@ impl<'a> Solver<'a> {
         self.search.rows.mean_cost(&self.model.residual, false)
     }
 
-    fn candidates(&mut self) -> Vec<Candidate> {
+    /// So many places where lights are missing, judged by about `per_candidate` rows each.
+    pub(super) fn candidates(&mut self, count: usize, per_candidate: f32) -> Vec<Candidate> {
         let rows = self.search.rows;
         self.label += 1;
         if self.places.is_empty() {
             let brightness = |i: usize| rows.target[i].max_element().min(0.63);
-            draw(self.search, self.limits.candidates, self.label, brightness)
+            draw(self.search, count, per_candidate, self.label, brightness)
         } else {
             let missing = |i: usize| {
                 let r = (self.model.residual[i] * rows.weight[i]).max(Vec3::ZERO);
                 r.max_element().powf(1.5)
             };
-            draw(self.search, self.limits.candidates, self.label, missing)
+            draw(self.search, count, per_candidate, self.label, missing)
         }
     }
 
@@ -109,7 +118,7 @@ impl<'a> Solver<'a> {
         let mut round = 0;
         while self.places.len() < self.limits.lights && idle < PATIENCE {
             if round % REDRAW == 0 {
-                candidates = self.candidates();
+                candidates = self.candidates(self.limits.candidates, CANDIDATE_ROWS);
             }
             let wanted = match self.places.len() {
                 0..6 => 2,
@@ -155,6 +164,8 @@ impl<'a> Solver<'a> {
         if settling > 1 {
             self.merge_with_neighbours();
             self.polish();
+            self.model.refit(rows, 2, 20);
+            self.add_spots();
         }
         self.model.refit(rows, 4, 40);
         progress(1.0);
@@ -284,7 +295,7 @@ impl<'a> Solver<'a> {
             .collect()
     }
 
-    fn prune(&mut self) {
+    pub(super) fn prune(&mut self) {
         let rows = self.search.rows;
         loop {
             let worth = self.worth();
@@ -299,6 +310,9 @@ impl<'a> Solver<'a> {
             for i in poor.into_iter().rev() {
                 self.model.remove(self.fixed + i);
                 self.places.remove(i);
+                if i < self.cones.len() {
+                    self.cones.remove(i);
+                }
             }
             self.model.refit(rows, 2, 15);
         }
@@ -312,10 +326,12 @@ impl<'a> Solver<'a> {
             .iter()
             .zip(&self.model.coefficients[self.fixed..])
             .zip(worth)
-            .map(|((position, power), worth)| Found {
+            .enumerate()
+            .map(|(i, ((position, power), worth))| Found {
                 position: *position,
                 power: *power,
                 share: worth / total.max(f64::MIN_POSITIVE),
+                cone: self.cones.get(i).copied().flatten(),
             })
             .collect()
     }
