@@ -8,6 +8,7 @@
 #include "prelude.glsl"
 #include "gbuffer.glsl"
 #include "ambient.glsl"
+#include "packed.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -25,6 +26,8 @@ void main() {
     ivec2 p = ivec2(pixel);
     vec4 albedo = imageLoad(gbuffer_albedo, p);
     vec3 irradiance = imageLoad(image_direct, p).rgb;
+    if (FC.denoised == 1) irradiance = unpack_colour(imageLoad(filter_a, p)).rgb;
+    if (FC.denoised == 2) irradiance = unpack_colour(imageLoad(filter_b, p)).rgb;
     if (FC.illumination != 0 && FC.ambient != AMBIENT_OFF && albedo.rgb != vec3(0.0)) {
         irradiance += ambient_at(imageLoad(gbuffer_position, p).xyz, unpack_normal(imageLoad(gbuffer_surface, p).x));
     }

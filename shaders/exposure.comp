@@ -5,6 +5,7 @@
 #include "prelude.glsl"
 #include "gbuffer.glsl"
 #include "tonemap.glsl"
+#include "shown.glsl"
 
 layout(local_size_x = 128) in;
 
@@ -24,7 +25,7 @@ void main() {
         float mean = 0.0;
         [[dont_unroll]] for (uint k = 0; k < points.x * points.y; k++) {
             ivec2 p = ivec2(first + uvec2(k % points.x, k / points.x) * extent / points);
-            vec3 c = accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated) : imageLoad(image_composite, p).rgb;
+            vec3 c = accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated) : shown_radiance(p);
             float l = luminance(c);
             mean += isnan(l) || isinf(l) ? 0.0 : l;
         }

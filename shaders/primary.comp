@@ -8,6 +8,7 @@
 #include "surface.glsl"
 #include "camera.glsl"
 #include "gbuffer.glsl"
+#include "guide.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -18,7 +19,6 @@ void main() {
     vec3 origin, direction;
     camera_ray(pixel, sample_index, origin, direction);
     Hit hit = trace_closest(origin, direction, RAY_FAR);
-    imageStore(gbuffer_motion, p, vec4(0.0));
     imageStore(gbuffer_view, p, vec4(direction, 0.0));
     if (hit.triangle == NONE) {
         imageStore(gbuffer_albedo, p, vec4(0.0));
@@ -26,6 +26,8 @@ void main() {
         imageStore(gbuffer_surface, p, uvec4(0, 0, NONE, NONE));
         imageStore(gbuffer_object, p, uvec4(NONE, NONE, 0, NONE));
         imageStore(image_emission, p, vec4(0.0));
+        imageStore(gbuffer_motion, p, vec4(motion_of_direction(direction), 0.0, 0.0));
+        imageStore(guide, p, uvec4(0));
         return;
     }
     SurfaceHit s = surface_at(hit, direction, FC.cone);
@@ -34,4 +36,9 @@ void main() {
     imageStore(gbuffer_surface, p, uvec4(pack_normal(s.shading_normal), pack_normal(s.geometric_normal), s.material, s.row));
     imageStore(gbuffer_object, p, uvec4(hit.triangle, hit.instance, packUnorm2x16(hit.barycentrics), s.cluster));
     imageStore(image_emission, p, vec4(emission_seen(s, direction), 0.0));
+    // A sky's picture is infinitely far away, wherever the surface that shows it is.
+    bool sky = (FC.materials.at[s.material].flags & MATERIAL_SKY) != 0;
+    imageStore(gbuffer_motion, p, vec4(sky ? motion_of_direction(direction) : motion_of(s.position), hit.t, 0.0));
+    float depth = s.albedo == vec3(0.0) ? 0.0 : dot(s.position - FC.eye, FC.forward);
+    imageStore(guide, p, pack_guide(depth, to_view(s.shading_normal), s.material, hit.instance));
 }

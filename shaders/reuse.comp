@@ -16,6 +16,7 @@
 #include "visibility.glsl"
 #include "reservoir.glsl"
 #include "ray_counts.glsl"
+#include "strata.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -111,6 +112,17 @@ void main() {
         if (own.count > 0.0) irradiance = reuse(pixel, imageLoad(gbuffer_position, p).w, own, counts);
         FC.reservoir_history.at[index] = own;
         imageStore(image_direct, p, vec4(irradiance, 0.0));
+        if (stands_for_stratum(pixel)) {
+            Stratum kept;
+            kept.position = own.position;
+            kept.shading_normal = own.shading_normal;
+            kept.geometric_normal = own.geometric_normal;
+            kept.row = own.count > 0.0 ? own.row : NONE;
+            kept.light = own.light;
+            kept.point = own.point;
+            kept.weight = own.weight;
+            keep_stratum(pixel, kept, irradiance);
+        }
     }
     end_counting(counts);
 }

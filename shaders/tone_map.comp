@@ -6,6 +6,9 @@
 #include "gbuffer.glsl"
 #include "tonemap.glsl"
 #include "ambient.glsl"
+#include "gradient.glsl"
+#include "shown.glsl"
+#include "packed.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -22,12 +25,18 @@ void main() {
     ivec2 p = ivec2(pixel);
     float exposure = FC.fixed_exposure > 0.0 ? FC.fixed_exposure : FC.exposure.at[0];
     vec3 radiance = accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated)
-                                    : imageLoad(image_composite, p).rgb;
+                                    : shown_radiance(p);
     if (FC.view == 8) radiance = imageLoad(image_direct, p).rgb;
     if (FC.view == 9) radiance = imageLoad(image_emission, p).rgb;
     if (FC.view == 10) {
         radiance = ambient_at(imageLoad(gbuffer_position, p).xyz, unpack_normal(imageLoad(gbuffer_surface, p).x));
     }
+    vec4 moments = FC.denoised != 0 ? imageLoad(moments_now, p) : vec4(0.0);
+    vec4 filtered = FC.denoised == 0 ? vec4(imageLoad(image_direct, p).rgb, 0.0)
+                                     : unpack_colour(FC.denoised == 2 ? imageLoad(filter_b, p) : imageLoad(filter_a, p));
+    if (FC.view == 11 || FC.view >= 18) radiance = filtered.rgb;
+    if (FC.view == 14) radiance = vec3(sqrt(filtered.a));
+    if (FC.view == 15) radiance = vec3(moments.x, sqrt(moments.y), 0.0);
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
     vec3 shown = encode_srgb(clamp(tone_map(clamp(radiance * exposure, vec3(0.0), vec3(1e4)), FC.tonemap), vec3(0.0), vec3(1.0)));
     uvec4 surface = imageLoad(gbuffer_surface, p);
@@ -40,5 +49,9 @@ void main() {
     if (FC.view == 5) shown = fract(position.xyz / 256.0);
     if (FC.view == 6) shown = number_colour(object.w);
     if (FC.view == 7) shown = number_colour(surface.z);
+    if (FC.view == 12) shown = vec3(moments.z > 0.0 ? mix(max(1.0 / moments.z, FC.least_alpha), 1.0, gradient_at(p)) : 0.0);
+    if (FC.view == 13) shown = vec3(moments.z / (moments.z + 20.0));
+    if (FC.view == 16) shown = vec3(gradient_at(p));
+    if (FC.view == 17) shown = vec3(imageLoad(gbuffer_motion, p).xy / 32.0 + 0.5, 0.5);
     imageStore(image_display, p, vec4(shown, 1.0));
 }

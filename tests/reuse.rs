@@ -74,6 +74,8 @@ fn reused_samples_have_the_mean_of_all_lights() {
         let settings = Settings {
             antialiasing: false,
             ambient: AmbientLight::Off,
+            denoiser: false,
+            taa: false,
             reuse_neighbours: 2,
             ..Settings::default()
         };
@@ -128,7 +130,11 @@ fn history_ends_where_reuse_does() {
     with_device(|device| {
         let scene = real("oa_dm1");
         let camera = spawn_camera(&scene, 0);
-        let settings = Settings::default();
+        let settings = Settings {
+            denoiser: false,
+            taa: false,
+            ..Settings::default()
+        };
         let gpu = SceneGpu::new(device, &scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
         let renderer = GpuRenderer::new(&gpu).unwrap();
         let frame = |index: u32, reuse: bool, seed: u32| FrameInput {

@@ -4,6 +4,7 @@
 use q3rays::render::bvh_upload::MeshTree;
 use q3rays::render::frame_constants::{FrameConstants, Push};
 use q3rays::render::reservoirs::Reservoir;
+use q3rays::render::strata::Stratum;
 use q3rays::scene::records::{
     AmbientCube, BspNode, CellEntry, Instance, Light, LightCell, LightNode, LightRow, LightRun, Material, TextureInfo,
     Triangle, VertexAttributes,
@@ -187,6 +188,18 @@ fn records() -> Vec<Record> {
             opaque_count,
             padding
         }),
+        record!(Stratum {
+            position,
+            shading_normal,
+            geometric_normal,
+            row,
+            address,
+            sample_index,
+            light,
+            point,
+            weight,
+            luminance
+        }),
         record!(FrameConstants {
             positions,
             attributes,
@@ -212,6 +225,7 @@ fn records() -> Vec<Record> {
             instance_nodes,
             reservoirs,
             reservoir_history,
+            strata,
             counters,
             exposure,
             focus,
@@ -258,12 +272,26 @@ fn records() -> Vec<Record> {
             exposure_blend,
             cell_mask,
             ambient_depth,
+            jitter,
+            old_jitter,
+            denoised,
+            taa,
+            history,
+            still,
+            least_alpha,
+            taa_gamma,
+            fireflies,
+            reservoirs_used,
+            changed,
+            filter_levels,
             padding
         }),
         record!(Push {
             frame,
             sample_index,
-            accumulated
+            accumulated,
+            level,
+            padding
         }),
     ]
 }

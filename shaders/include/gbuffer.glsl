@@ -7,13 +7,19 @@
 // | surface | shading normal and geometric normal (octahedral, 2 x 16 bits), material, light row |
 // | object | global triangle, instance, barycentrics (2 x 16 bits), PVS cluster |
 // | view | direction of the ray |
-// | motion | previous − current image position, pixels, y down |
+// | motion | previous − current image position, pixels, y down; distance along the ray, 0 for none |
 // | emission | radiance emitted towards the eye |
 // | direct | irradiance/π by direct light, not multiplied with the albedo |
 // | composite | radiance of the pixel |
 // | mean, compensation | accumulated radiance: see accumulate.comp |
 // | mean_direct, mean_emission | accumulated shares |
 // | display | encoded output |
+// | filter_a, filter_b | denoiser: irradiance/π; variance of its luminance (packed.glsl) |
+// | gradient_a, gradient_b | one texel per stratum of 3 x 3 pixels: |Δ| of the luminance; the larger luminance |
+// | guide | view depth (0: nothing that reflects), shading normal (2 x 12 bits), 8 bits of material and instance |
+// | irradiance | history: irradiance/π (packed.glsl) |
+// | moments | history: first and second moment of the luminance; frames; share of one sample's variance that their mean has |
+// | taa | history: radiance; frames |
 #ifndef GBUFFER_GLSL
 #define GBUFFER_GLSL
 
@@ -22,7 +28,7 @@ layout(set = 1, binding = 1, rgba32f) uniform image2D gbuffer_position;
 layout(set = 1, binding = 2, rgba32ui) uniform uimage2D gbuffer_surface;
 layout(set = 1, binding = 3, rgba32ui) uniform uimage2D gbuffer_object;
 layout(set = 1, binding = 4, rgba32f) uniform image2D gbuffer_view;
-layout(set = 1, binding = 5, rgba16f) uniform image2D gbuffer_motion;
+layout(set = 1, binding = 5, rgba32f) uniform image2D gbuffer_motion;
 layout(set = 1, binding = 6, rgba32f) uniform image2D image_emission;
 layout(set = 1, binding = 7, rgba32f) uniform image2D image_direct;
 layout(set = 1, binding = 8, rgba32f) uniform image2D image_composite;
@@ -31,6 +37,18 @@ layout(set = 1, binding = 10, rgba32f) uniform image2D image_compensation;
 layout(set = 1, binding = 11, rgba32f) uniform image2D image_mean_direct;
 layout(set = 1, binding = 12, rgba32f) uniform image2D image_mean_emission;
 layout(set = 1, binding = 13, rgba8) uniform image2D image_display;
+layout(set = 1, binding = 14, rgba16ui) uniform uimage2D filter_a;
+layout(set = 1, binding = 15, rgba16ui) uniform uimage2D filter_b;
+layout(set = 1, binding = 16, rgba32f) uniform image2D gradient_a;
+layout(set = 1, binding = 17, rgba32f) uniform image2D gradient_b;
+layout(set = 1, binding = 18, rgba16ui) uniform uimage2D guide;
+layout(set = 1, binding = 19, rgba16ui) uniform uimage2D old_guide;
+layout(set = 1, binding = 20, rgba16ui) uniform uimage2D irradiance_now;
+layout(set = 1, binding = 21, rgba16ui) uniform uimage2D irradiance_before;
+layout(set = 1, binding = 22, rgba32f) uniform image2D moments_now;
+layout(set = 1, binding = 23, rgba32f) uniform image2D moments_before;
+layout(set = 1, binding = 24, rgba32f) uniform image2D taa_now;
+layout(set = 1, binding = 25, rgba32f) uniform image2D taa_before;
 
 // Octahedral map of a unit vector to 2 x 16 bits (Meyer et al. 2010).
 uint pack_normal(vec3 n) {

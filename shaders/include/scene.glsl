@@ -136,6 +136,24 @@ struct Reservoir {
     float target;
 };
 
+// What a pixel of a stratum was shaded with in the frame before, enough to shade it again. The normals are packed.
+struct Stratum {
+    vec3 position;
+    uint shading_normal;
+    uint geometric_normal;
+    // Light row of the receiver; NONE where the pixel showed nothing that reflects.
+    uint row;
+    // Address and index of its random numbers.
+    uint address;
+    uint sample_index;
+    // The sample that it kept where samples are reused, its weight, else NONE.
+    uint light;
+    vec2 point;
+    float weight;
+    // Luminance of what it got.
+    float luminance;
+};
+
 // Size of a texture: queries of the texture itself cost more, and some drivers answer them wrongly for an index that
 // differs between threads.
 struct TextureInfo {
@@ -175,6 +193,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Mes
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Words4 { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Floats4 { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Reservoirs { Reservoir at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Strata { Stratum at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Floats { float at[]; };
 
@@ -204,6 +223,7 @@ struct FrameConstants {
     Floats4 instance_nodes;
     Reservoirs reservoirs;
     Reservoirs reservoir_history;
+    Strata strata;
     Counters counters;
     Floats exposure;
     Floats focus;
@@ -250,6 +270,18 @@ struct FrameConstants {
     float exposure_blend;
     uint cell_mask;
     uint ambient_depth;
+    vec2 jitter;
+    vec2 old_jitter;
+    uint denoised;
+    uint taa;
+    uint history;
+    uint still;
+    float least_alpha;
+    float taa_gamma;
+    float fireflies;
+    uint reservoirs_used;
+    uint changed;
+    uint filter_levels;
     uint padding;
 };
 
@@ -261,6 +293,9 @@ layout(push_constant, scalar) uniform Push {
     uint sample_index;
     // Samples in the accumulation, this one included; 0 where nothing is accumulated.
     uint accumulated;
+    // Number of the filter level, from 0.
+    uint level;
+    uint padding;
 };
 
 #define FC frame.constants

@@ -11,7 +11,7 @@ use crate::output::{atomic, picture, stdout};
 use crate::reference::direct::RayCounts;
 use crate::render::film::Film;
 use crate::render::frame::FrameInput;
-use crate::render::gpu_renderer::film as read_film;
+use crate::render::gpu_renderer::{film as read_film, shown_film};
 use crate::render::realtime::Realtime;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
@@ -92,15 +92,14 @@ pub fn run_frames(
     for index in 0..count {
         let camera = path(index);
         let still = index > 0 && camera == path(index - 1);
-        // Without accumulation each frame is an accumulation of one, so that the last can be read back alike.
-        accumulated = if job.accumulate && still { accumulated + 1 } else { 1 };
+        accumulated = if job.accumulate && still { accumulated + 1 } else { 0 };
         let input = FrameInput {
             camera,
             settings: *job.settings,
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,
-            reuse: accumulated <= 1,
+            reuse: accumulated == 0,
             output: true,
         };
         let ended = realtime
@@ -110,7 +109,12 @@ pub fn run_frames(
         progress((index + 1) as f32 / count as f32);
     }
     frames.extend(realtime.finish().map_err(CliError::failed)?);
-    let film = read_film(&realtime.view, accumulated).map_err(CliError::failed)?;
+    let film = if accumulated > 0 {
+        read_film(&realtime.view, accumulated)
+    } else {
+        shown_film(&realtime.view)
+    }
+    .map_err(CliError::failed)?;
     Ok(Run { film, frames })
 }
 

@@ -191,18 +191,14 @@ impl Shown {
             .map_err(CliError::failed)?;
         let accumulate = cvars.number("rt_accumulate") != 0.0 || cvars.number("rt_refine") != 0.0;
         let still = accumulate && !moved && before == (size.width, size.height);
-        self.accumulated = if still {
-            self.accumulated + 1
-        } else {
-            u32::from(accumulate)
-        };
+        self.accumulated = if still { self.accumulated + 1 } else { 0 };
         let input = FrameInput {
             camera: self.camera,
             settings: settings(cvars),
             sample_index: self.frame,
             accumulated: self.accumulated,
             exposure_blend: (EXPOSURE_RATE * seconds).min(1.0),
-            reuse: self.accumulated <= 1,
+            reuse: self.accumulated == 0,
             output: true,
         };
         let swapchain = &mut self.swapchain;

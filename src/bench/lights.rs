@@ -5,6 +5,7 @@
 //! so that the references' own noise is no floor. Anti-aliasing is off on both sides: only light is left to chance. Time is
 //! the GPU's for the passes that light the surfaces.
 
+use super::references::{Pixels, References, mean};
 use crate::gpu::{GpuError, SubmitSync};
 use crate::output::stats::FrameStats;
 use crate::render::frame::FrameInput;
@@ -13,7 +14,6 @@ use crate::render::realtime::Realtime;
 use crate::render::scene_gpu::{RenderError, SceneGpu};
 use crate::render::settings::{AmbientLight, LightSampling, Settings};
 use crate::scene::camera::Camera;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -169,63 +169,6 @@ const REFERENCE: Config = Config {
 };
 const PASSES: [&str; 3] = ["direct", "resample", "reuse"];
 
-type Pixels = Vec<[f32; 3]>;
-
-struct References {
-    images: [Pixels; 2],
-    mean: f64,
-}
-
-fn mean(pixels: &Pixels) -> f64 {
-    let sum: f64 = pixels.iter().flatten().map(|v| f64::from(*v)).sum();
-    sum / (pixels.len() * 3).max(1) as f64
-}
-
-impl References {
-    /// Mean and trimmed mean over pixels of the product of the errors against both.
-    fn error(&self, image: &Pixels) -> (f64, f64) {
-        let floor = 0.01 * self.mean * self.mean;
-        let [r1, r2] = &self.images;
-        let mut errors: Vec<f64> = (0..image.len())
-            .into_par_iter()
-            .map(|i| {
-                (0..3)
-                    .map(|c| {
-                        let [v, a, b] = [image[i][c], r1[i][c], r2[i][c]].map(f64::from);
-                        let r = 0.5 * (a + b);
-                        (v - a) * (v - b) / (r * r + floor)
-                    })
-                    .sum::<f64>()
-                    / 3.0
-            })
-            .collect();
-        let n = errors.len().max(1);
-        let whole = errors.iter().sum::<f64>() / n as f64;
-        let kept = n - n / 1000;
-        if kept < n {
-            errors.select_nth_unstable_by(kept, f64::total_cmp);
-        }
-        (whole, errors[..kept].iter().sum::<f64>() / kept as f64)
-    }
-
-    /// Relative squared error of one reference.
-    fn own_error(&self) -> f64 {
-        let floor = 0.01 * self.mean * self.mean;
-        let [r1, r2] = &self.images;
-        let sum: f64 = r1
-            .iter()
-            .flatten()
-            .zip(r2.iter().flatten())
-            .map(|(a, b)| {
-                let (a, b) = (f64::from(*a), f64::from(*b));
-                let r = 0.5 * (a + b);
-                (a - b) * (a - b) / (r * r + floor) * 0.5
-            })
-            .sum();
-        sum / (r1.len() * 3) as f64
-    }
-}
-
 /// The measurement of one map and camera.
 pub struct LightsBench {
     realtime: Realtime,
@@ -247,6 +190,8 @@ impl LightsBench {
                 antialiasing: false,
                 aperture: 0.0,
                 ambient: AmbientLight::Off,
+                denoiser: false,
+                taa: false,
                 ..*base
             },
             options,
@@ -291,8 +236,7 @@ impl LightsBench {
             self.realtime.finish()?;
             *image = film(&self.realtime.view, self.options.references)?.mean;
         }
-        let mean = 0.5 * (mean(&images[0]) + mean(&images[1]));
-        Ok(References { images, mean })
+        Ok(References::new(images))
     }
 
     fn measure(&mut self, config: &Config, references: &References) -> Result<Measured, RenderError> {
@@ -364,7 +308,7 @@ impl LightsBench {
         let n = f64::from(RUNS);
         let average = means.iter().sum::<f64>() / n;
         let variance = means.iter().map(|m| (m - average).powi(2)).sum::<f64>() / (n - 1.0);
-        let [a, b] = references.images.each_ref().map(mean);
+        let [a, b] = references.images.each_ref().map(|i| mean(i));
         let of_references = ((a - b) / references.mean).powi(2) * 0.25;
         Ok(Bias {
             mode,
@@ -403,27 +347,5 @@ impl LightsBench {
             measured,
             bias,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_noise_of_the_references_is_no_floor() {
-        let noise = |i: usize, s: u32| crate::scene::sampling::unit(crate::scene::sampling::key(s, i as u32, 0)) - 0.5;
-        let n = 100_000;
-        let image = |amplitude: f32, s: u32| -> Pixels { (0..n).map(|i| [1.0 + amplitude * noise(i, s); 3]).collect() };
-        let references = References {
-            images: [image(0.2, 1), image(0.2, 2)],
-            mean: 1.0,
-        };
-        // Variance of a uniform number is 1/12.
-        let (exact, _) = references.error(&image(0.0, 3));
-        assert!(exact.abs() < 1e-4, "{exact}");
-        let (noisy, trimmed) = references.error(&image(1.0, 3));
-        assert!((noisy - 1.0 / 12.0).abs() < 4e-3 && trimmed < noisy, "{noisy}");
-        assert!((references.own_error() - 0.04 / 12.0).abs() < 3e-4);
     }
 }

@@ -157,6 +157,8 @@ impl<'a> RaysBench<'a> {
                 frame: constants.address(),
                 sample_index: 0,
                 accumulated: 0,
+                level: 0,
+                padding: 0,
             },
             _constants: constants,
             groups,

@@ -3,6 +3,8 @@
 use super::args::{CliError, CliResult};
 use super::common::{Common, progress};
 use super::render::{camera, parse_size};
+use crate::bench::denoiser::{DenoiserBench, Options as DenoiserOptions};
+use crate::bench::denoiser_report::DenoiserReport;
 use crate::bench::lights::{LightsBench, Options as LightsOptions};
 use crate::bench::lights_plot;
 use crate::bench::lights_report::LightsReport;
@@ -31,6 +33,8 @@ enum What {
     Rays(RaysArgs),
     /// Error against time of the ways to choose a light
     Lights(LightsArgs),
+    /// What the denoiser makes of one light sample per pixel, and its times
+    Denoiser(DenoiserArgs),
 }
 
 /// Maps of the published figures, from small to large.
@@ -91,6 +95,37 @@ struct LightsArgs {
     plot: Option<PathBuf>,
 }
 
+/// Maps of suns, of few and of many lamps.
+const DENOISER_MAPS: [&str; 8] = [
+    "oa_dm1",
+    "am_galmevish2",
+    "oa_minia",
+    "ctf_compromise",
+    "kaos",
+    "oa_dm4",
+    "wrackdm17",
+    "slimefac",
+];
+
+#[derive(clap::Args)]
+struct DenoiserArgs {
+    /// Map names
+    #[arg(default_values = DENOISER_MAPS)]
+    maps: Vec<String>,
+    /// Size of the frames
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
+    size: (u32, u32),
+    /// Samples of each of the two references
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    references: u32,
+    /// Spawn points per map
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    spawns: usize,
+    /// Also write everything measured as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Trees {
     /// As maps are loaded for rendering
@@ -104,7 +139,46 @@ pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
     match &args.what {
         What::Rays(args) => rays(common, cvars, args),
         What::Lights(args) => lights(common, cvars, args),
+        What::Denoiser(args) => denoiser(common, cvars, args),
     }
+}
+
+fn denoiser(common: &Common, cvars: &Cvars, args: &DenoiserArgs) -> CliResult {
+    if let Some(path) = &args.json {
+        atomic::create_parent(path).map_err(CliError::failed)?;
+    }
+    let Engine::Vulkan { device, backend } = common.engine(cvars)? else {
+        return Err(CliError::Failed(
+            "bench denoiser measures Vulkan devices; there is none".to_owned(),
+        ));
+    };
+    let options = DenoiserOptions {
+        size: args.size,
+        references: args.references,
+    };
+    let mut report = DenoiserReport {
+        device: device.info().name.clone(),
+        driver: device.info().driver.clone(),
+        size: args.size.into(),
+        views: Vec::new(),
+    };
+    for map in &args.maps {
+        let (scene, _) = common.lit_scene(map, cvars)?;
+        let gpu = SceneGpu::new(&device, &scene, backend, BvhQuality::Balanced).map_err(CliError::failed)?;
+        let mut bench = DenoiserBench::new(Arc::new(gpu), &settings(cvars), options).map_err(CliError::failed)?;
+        for spawn in 0..args.spawns.min(scene.spawns.len()) {
+            let view = camera(&scene, None, Some(spawn), FOV)?;
+            report
+                .views
+                .push(bench.run(map, spawn, &view).map_err(CliError::failed)?);
+            // What is measured is kept, also where a later view fails.
+            if let Some(path) = &args.json {
+                let text = serde_json::to_string_pretty(&report).map_err(CliError::failed)?;
+                atomic::write(path, text.as_bytes()).map_err(CliError::failed)?;
+            }
+        }
+    }
+    stdout::line(&report).map_err(CliError::failed)
 }
 
 fn lights(common: &Common, cvars: &Cvars, args: &LightsArgs) -> CliResult {

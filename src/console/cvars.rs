@@ -47,7 +47,7 @@ const fn choice(name: &'static str, words: &'static [&'static str], help: &'stat
 }
 
 /// Views of the frame's intermediate images, by `rt_view`; the shader's numbering is the order here.
-pub const VIEWS: [&str; 11] = [
+pub const VIEWS: [&str; 23] = [
     "final",
     "albedo",
     "normal",
@@ -59,6 +59,18 @@ pub const VIEWS: [&str; 11] = [
     "direct",
     "emission",
     "ambient",
+    "denoised",
+    "alpha",
+    "history",
+    "variance",
+    "moments",
+    "gradient",
+    "motion",
+    "atrous0",
+    "atrous1",
+    "atrous2",
+    "atrous3",
+    "atrous4",
 ];
 
 /// Every console variable.
@@ -115,10 +127,10 @@ pub const CVARS: &[Cvar] = &[
     ),
     int(
         "rt_refine",
-        1,
+        0,
         0,
         1,
-        "averages frames in the window while nothing moves",
+        "averages frames in the window while nothing moves, in place of denoising them",
     ),
     int("rt_pause", 0, 0, 1, "stops the scene's clock"),
     float(
@@ -169,8 +181,9 @@ pub const CVARS: &[Cvar] = &[
         "rt_lightReuse",
         1,
         0,
-        1,
-        "reuses light samples between frames and pixels, with rt_lightSampling reservoir and rt_numRandomDL 1",
+        2,
+        "reuses light samples between frames and pixels, with rt_lightSampling reservoir and rt_numRandomDL 1: 1 in frames that \
+         are not denoised, 2 in all; the denoiser does better with samples that do not depend on each other",
     ),
     int(
         "rt_reuseHistory",
@@ -185,6 +198,50 @@ pub const CVARS: &[Cvar] = &[
         0,
         4,
         "neighbours whose light samples a pixel reuses",
+    ),
+    int(
+        "rt_denoiser",
+        1,
+        0,
+        1,
+        "denoises frames that are shown as they come (A-SVGF); averaged frames are never denoised",
+    ),
+    int(
+        "rt_gradients",
+        1,
+        0,
+        1,
+        "lets the denoiser forget at once where the light has changed since the frame before",
+    ),
+    int("rt_atrousLevels", 5, 0, 5, "levels of the denoiser's spatial filter"),
+    float(
+        "rt_leastAlpha",
+        0.05,
+        0.05,
+        1.0,
+        "least weight of a new frame in the denoiser's history",
+    ),
+    float(
+        "rt_fireflies",
+        0.0,
+        0.0,
+        100.0,
+        "clamps light samples to so many standard deviations over the mean of their surroundings before they are denoised, \
+         which darkens; 0 clamps nothing",
+    ),
+    int(
+        "rt_taa",
+        1,
+        0,
+        1,
+        "temporal anti-aliasing of frames that are shown as they come, with rt_antialiasing",
+    ),
+    float(
+        "rt_taaGamma",
+        2.0,
+        0.25,
+        16.0,
+        "half width of the colours that temporal anti-aliasing lets history have, standard deviations",
     ),
     int("rt_seed", 0, 0, 0xffff_ffff, "seed of all random numbers"),
     int("rt_printPerfStats", 0, 0, 1, "prints times per pass every second"),

@@ -34,7 +34,8 @@ pub fn settings(cvars: &Cvars) -> Settings {
             1 => AmbientLight::Constant,
             _ => AmbientLight::Off,
         },
-        light_reuse: number("rt_lightReuse") != 0.0,
+        light_reuse: on("rt_lightReuse"),
+        reuse_denoised: number("rt_lightReuse") >= 2.0,
         reuse_history: number("rt_reuseHistory") as u32,
         reuse_neighbours: number("rt_reuseNeighbours") as u32,
         candidates: number("rt_lightCandidates") as u32,
@@ -59,6 +60,13 @@ pub fn settings(cvars: &Cvars) -> Settings {
             _ => Tonemap::Clamp,
         },
         view: number("rt_view") as u32,
+        denoiser: on("rt_denoiser"),
+        gradients: on("rt_gradients"),
+        atrous_levels: number("rt_atrousLevels") as u32,
+        least_alpha: number("rt_leastAlpha") as f32,
+        fireflies: number("rt_fireflies") as f32,
+        taa: on("rt_taa"),
+        taa_gamma: number("rt_taaGamma") as f32,
         filter_textures: true,
     }
 }

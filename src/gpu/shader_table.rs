@@ -45,6 +45,12 @@ shader_table! {
     "reuse_rayquery": "reuse.comp" ["TRACE_RAYQUERY" = "1"];
     "focus_bvh": "focus.comp" ["TRACE_BVH2" = "1"];
     "focus_rayquery": "focus.comp" ["TRACE_RAYQUERY" = "1"];
+    "gradient_bvh": "gradient.comp" [];
+    "gradient_rayquery": "gradient.comp" ["TRACE_RAYQUERY" = "1"];
+    "gradient_atrous": "gradient_atrous.comp" [];
+    "temporal": "temporal.comp" [];
+    "atrous": "atrous.comp" [];
+    "taa": "taa.comp" [];
     "composite": "composite.comp" [];
     "exposure": "exposure.comp" [];
     "tone_map": "tone_map.comp" [];

@@ -23,7 +23,15 @@ impl Composite {
     pub fn record(&self, r: &mut Recorder<'_>) -> Result<(), GpuError> {
         let g = r.gbuffer;
         let mut uses = Vec::new();
-        for image in [g.albedo(), g.position(), g.surface(), g.direct(), g.emission()] {
+        for image in [
+            g.albedo(),
+            g.position(),
+            g.surface(),
+            g.direct(),
+            g.emission(),
+            g.filter_a(),
+            g.filter_b(),
+        ] {
             uses.push(Use::image(image, Access::ComputeRead));
         }
         uses.push(Use::image(g.composite(), Access::ComputeWrite));

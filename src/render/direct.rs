@@ -2,6 +2,7 @@
 //! Shader: `shaders/direct.comp`.
 
 use super::pass::{Pass, PassContext, Recorder};
+use super::strata::Strata;
 use crate::gpu::{Access, Buffer, GpuError, Use};
 
 /// The pass.
@@ -20,7 +21,7 @@ impl Direct {
     ///
     /// # Errors
     /// [`GpuError`] of the device.
-    pub fn record(&self, r: &mut Recorder<'_>, counters: &Buffer) -> Result<(), GpuError> {
+    pub fn record(&self, r: &mut Recorder<'_>, counters: &Buffer, strata: &Strata) -> Result<(), GpuError> {
         let g = r.gbuffer;
         let uses = [
             Use::image(g.albedo(), Access::ComputeRead),
@@ -28,6 +29,7 @@ impl Direct {
             Use::image(g.surface(), Access::ComputeRead),
             Use::image(g.direct(), Access::ComputeWrite),
             Use::buffer(counters, Access::ComputeReadWrite),
+            Use::buffer(&strata.buffer, Access::ComputeWrite),
         ];
         self.0.record_image(r, &uses)
     }

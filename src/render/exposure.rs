@@ -25,6 +25,7 @@ impl Exposure {
         let uses = [
             Use::image(g.composite(), Access::ComputeRead),
             Use::image(g.mean(), Access::ComputeRead),
+            Use::image(g.taa().now(g.parity), Access::ComputeRead),
             Use::buffer(exposure, Access::ComputeReadWrite),
         ];
         self.0.record(r, &uses, [1, 1, 1])

@@ -1,17 +1,22 @@
 //! The frame, pass by pass.
 
+use super::atrous::Atrous;
 use super::composite::Composite;
 use super::direct::Direct;
 use super::exposure::Exposure;
 use super::focus::Focus;
 use super::frame_constants::{FrameConstants, Push};
 use super::gbuffer::GBuffer;
+use super::gradient::Gradient;
+use super::gradient_atrous::GradientAtrous;
 use super::pass::{PassContext, Recorder};
 use super::primary::Primary;
 use super::resample::Resample;
 use super::reuse::Reuse;
 use super::scene_gpu::SceneGpu;
 use super::settings::Settings;
+use super::taa::Taa;
+use super::temporal::Temporal;
 use super::tone_map::ToneMap;
 use super::view_state::ViewState;
 use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps};
@@ -36,6 +41,23 @@ pub struct FrameInput {
     pub output: bool,
 }
 
+impl FrameInput {
+    /// Whether the frame is denoised: averaged frames never are.
+    pub fn denoises(&self) -> bool {
+        self.settings.denoiser && self.settings.illumination && self.accumulated == 0
+    }
+
+    /// Whether light samples are reused.
+    pub fn reuses(&self) -> bool {
+        self.reuse && self.settings.reuses() && (self.settings.reuse_denoised || !self.denoises())
+    }
+
+    /// Whether the frame is blended with those before to smooth edges.
+    pub fn anti_aliases(&self) -> bool {
+        self.settings.taa && self.accumulated == 0
+    }
+}
+
 /// All passes, for one backend. Makes frames of any scene and view.
 pub struct FrameRenderer {
     primary: Primary,
@@ -43,7 +65,12 @@ pub struct FrameRenderer {
     direct: Direct,
     resample: Resample,
     reuse: Reuse,
+    gradient: Gradient,
+    gradient_atrous: GradientAtrous,
+    temporal: Temporal,
+    atrous: Atrous,
     composite: Composite,
+    taa: Taa,
     exposure: Exposure,
     tone_map: ToneMap,
     pub view_layout: Arc<DescriptorLayout>,
@@ -68,7 +95,12 @@ impl FrameRenderer {
             direct: Direct::new(&context)?,
             resample: Resample::new(&context)?,
             reuse: Reuse::new(&context)?,
+            gradient: Gradient::new(&context)?,
+            gradient_atrous: GradientAtrous::new(&context)?,
+            temporal: Temporal::new(&context)?,
+            atrous: Atrous::new(&context)?,
             composite: Composite::new(&context)?,
+            taa: Taa::new(&context)?,
             exposure: Exposure::new(&context)?,
             tone_map: ToneMap::new(&context)?,
             view_layout: view_layout.clone(),
@@ -88,8 +120,11 @@ impl FrameRenderer {
         slot: usize,
         input: &FrameInput,
     ) -> Result<(), GpuError> {
-        let mut constants = frame_constants(scene, view, slot, input)?;
-        let reuses = input.reuse && input.settings.reuses();
+        view.gbuffer.parity ^= 1;
+        view.anti_aliased = input.anti_aliases();
+        let constants = frame_constants(scene, view, slot, input)?;
+        let mut constants = view.history.advance(constants, input, scene.revision());
+        let reuses = input.reuses();
         if reuses {
             constants = view.reservoirs(&scene.device)?.complete(constants, &input.settings);
         } else if let Some(reservoirs) = &mut view.reservoirs {
@@ -106,20 +141,36 @@ impl FrameRenderer {
                 frame: view.constants[slot].address(),
                 sample_index: input.sample_index,
                 accumulated: input.accumulated,
+                level: 0,
+                padding: 0,
             },
         };
         if input.settings.aperture > 0.0 && input.settings.focus_distance <= 0.0 {
             self.focus.record(&mut r, &view.focus[slot])?;
         }
         self.primary.record(&mut r, &view.focus[slot])?;
-        match &view.reservoirs {
-            Some(reservoirs) if reuses => {
+        let denoises = input.denoises();
+        if denoises && constants.changed != 0 {
+            self.gradient.record(&mut r, &view.counters[slot], &view.strata)?;
+            self.gradient_atrous.record(&mut r)?;
+        }
+        let reservoirs = view.reservoirs.as_ref().filter(|_| reuses);
+        match reservoirs {
+            Some(reservoirs) => {
                 self.resample.record(&mut r, &view.counters[slot], reservoirs)?;
-                self.reuse.record(&mut r, &view.counters[slot], reservoirs)?;
+                self.reuse
+                    .record(&mut r, &view.counters[slot], reservoirs, &view.strata)?;
             }
-            _ => self.direct.record(&mut r, &view.counters[slot])?,
+            None => self.direct.record(&mut r, &view.counters[slot], &view.strata)?,
+        }
+        if denoises {
+            self.temporal.record(&mut r)?;
+            self.atrous.record(&mut r, input.settings.shown_levels())?;
         }
         self.composite.record(&mut r)?;
+        if input.anti_aliases() {
+            self.taa.record(&mut r, &view.exposure)?;
+        }
         if input.output {
             self.exposure.record(&mut r, &view.exposure)?;
             self.tone_map.record(&mut r, &view.exposure)?;
@@ -167,6 +218,13 @@ fn frame_constants(
         tonemap: s.tonemap as u32,
         view: s.view,
         fixed_exposure: s.exposure,
+        strata: view.strata.buffer.address(),
+        filter_levels: s.shown_levels(),
+        denoised: if input.denoises() { 1 + s.shown_levels() % 2 } else { 0 },
+        taa: u32::from(input.anti_aliases()),
+        least_alpha: s.least_alpha,
+        taa_gamma: s.taa_gamma,
+        fireflies: s.fireflies,
         exposure_blend: input.exposure_blend,
         ..base
     })

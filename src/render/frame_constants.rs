@@ -33,6 +33,8 @@ pub struct FrameConstants {
     /// Reservoirs of this frame, and those that the frame before left and this one leaves; 0 where samples are not reused.
     pub reservoirs: u64,
     pub reservoir_history: u64,
+    /// Samples that the denoiser's gradients are taken of.
+    pub strata: u64,
     pub counters: u64,
     pub exposure: u64,
     pub focus: u64,
@@ -48,7 +50,7 @@ pub struct FrameConstants {
     pub up: [f32; 3],
     /// Width of a pixel's cone at distance 1; 0 reads textures at full resolution.
     pub cone: f32,
-    /// Where the frame before was seen from, which the reservoirs' history belongs to.
+    /// Where the frame before was seen from, which all histories belong to.
     pub old_eye: [f32; 3],
     pub old_half_width: f32,
     pub old_forward: [f32; 3],
@@ -92,6 +94,28 @@ pub struct FrameConstants {
     /// Slots of the hash table of light cells, a power of two, less one.
     pub cell_mask: u32,
     pub ambient_depth: u32,
+    /// Where in its pixel every ray of this frame goes, pixels; negative: each sample elsewhere.
+    pub jitter: [f32; 2],
+    /// The same of the frame before.
+    pub old_jitter: [f32; 2],
+    /// Where the denoised irradiance is: 0 nowhere (it is off), 1 and 2 the images `filter_a` and `filter_b`.
+    pub denoised: u32,
+    pub taa: u32,
+    /// The view's histories are those of the frame before.
+    pub history: u32,
+    /// The view is the same as the frame before's.
+    pub still: u32,
+    /// Least weight of a new frame in the denoiser's history.
+    pub least_alpha: f32,
+    /// Half width of the TAA clip in standard deviations.
+    pub taa_gamma: f32,
+    /// Most that a sample may exceed its surroundings by, in standard deviations; 0: anything.
+    pub fireflies: f32,
+    /// This frame reuses light samples: `reservoirs` are there.
+    pub reservoirs_used: u32,
+    /// The lights are not those of the frame before: gradients tell where that matters.
+    pub changed: u32,
+    pub filter_levels: u32,
     pub padding: u32,
 }
 
@@ -104,4 +128,7 @@ pub struct Push {
     pub sample_index: u32,
     /// Samples in the accumulation, this one included; 0 where nothing is accumulated.
     pub accumulated: u32,
+    /// Number of the filter level, from 0.
+    pub level: u32,
+    pub padding: u32,
 }

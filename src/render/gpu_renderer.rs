@@ -33,27 +33,6 @@ fn words(image: &Image) -> Result<Vec<[u32; 4]>, GpuError> {
         .collect())
 }
 
-fn halves(image: &Image) -> Result<Vec<[f32; 4]>, GpuError> {
-    Ok(image
-        .read_back(0)?
-        .chunks_exact(8)
-        .map(|texel| std::array::from_fn(|c| half_to_f32(u16::from_le_bytes([texel[2 * c], texel[2 * c + 1]]))))
-        .collect())
-}
-
-/// IEEE 754 binary16 to binary32.
-fn half_to_f32(h: u16) -> f32 {
-    let sign = if h >> 15 == 1 { -1.0 } else { 1.0 };
-    let exponent = i32::from(h >> 10 & 31);
-    let mantissa = f32::from(h & 1023);
-    match exponent {
-        0 => sign * mantissa * (2f32).powi(-24),
-        31 if mantissa == 0.0 => sign * f32::INFINITY,
-        31 => f32::NAN,
-        e => sign * (1.0 + mantissa / 1024.0) * (2f32).powi(e - 15),
-    }
-}
-
 /// Unit vector of octahedral 2 x 16 signed normalised bits.
 fn unpack_normal(bits: u32) -> [f32; 3] {
     let part = |b: u32| (f32::from(b as u16 as i16) / 32767.0).max(-1.0);
@@ -156,7 +135,7 @@ impl<'a> GpuRenderer<'a> {
         let g = &view.gbuffer;
         let (albedo, position) = (floats(g.albedo())?, floats(g.position())?);
         let (surface, object) = (words(g.surface())?, words(g.object())?);
-        let motion = halves(g.motion())?;
+        let motion = floats(g.motion())?;
         let rgb = |p: &[f32; 4]| [p[0], p[1], p[2]];
         let number = |n: u32| if n == NONE { -1.0 } else { n as f32 };
         let normal = |bits: u32, hit: bool| if hit { unpack_normal(bits) } else { [0.0; 3] };
@@ -181,8 +160,31 @@ impl<'a> GpuRenderer<'a> {
 /// # Errors
 /// [`RenderError`] of the device.
 pub fn radiance(view: &ViewState) -> Result<Vec<[f32; 3]>, RenderError> {
-    let pixels = floats(view.gbuffer.composite())?;
-    Ok(pixels.iter().map(|p| [p[0], p[1], p[2]]).collect())
+    let g = &view.gbuffer;
+    let image = if view.anti_aliased {
+        g.taa().now(g.parity)
+    } else {
+        g.composite()
+    };
+    Ok(floats(image)?.iter().map(|p| [p[0], p[1], p[2]]).collect())
+}
+
+/// The frame that a view shows, as a film of one sample.
+///
+/// # Errors
+/// [`RenderError`] of the device.
+pub fn shown_film(view: &ViewState) -> Result<Film, RenderError> {
+    let g = &view.gbuffer;
+    let mut film = Film::new(g.size.0, g.size.1);
+    film.mean = radiance(view)?;
+    film.samples.fill(1.0);
+    for (i, e) in floats(g.emission())?.iter().enumerate() {
+        // Anti-aliasing mixes neighbours: what a pixel's centre emits may be more than the pixel shows.
+        let shown = film.mean[i];
+        film.emission[i] = std::array::from_fn(|c| e[c].min(shown[c]));
+        film.direct[i] = std::array::from_fn(|c| shown[c] - film.emission[i][c]);
+    }
+    Ok(film)
 }
 
 /// The accumulated image of a view after `count` samples.
@@ -215,23 +217,4 @@ pub fn film(view: &ViewState, count: u32) -> Result<Film, RenderError> {
         }
     }
     Ok(film)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn halves_decode() {
-        for (bits, value) in [
-            (0x3c00, 1.0),
-            (0xc000, -2.0),
-            (0x0001, 5.960_464_5e-8),
-            (0x7bff, 65504.0),
-            (0x3555, 0.333_251_95),
-        ] {
-            assert_eq!(half_to_f32(bits), value);
-        }
-        assert!(half_to_f32(0x7e00).is_nan());
-    }
 }

@@ -1,5 +1,6 @@
 //! The frame: [`frame`] reads like its table of contents, each pass has a file and a shader of the same stem.
 
+pub mod atrous;
 pub mod backend;
 pub mod bvh_upload;
 pub mod composite;
@@ -11,6 +12,9 @@ pub mod frame;
 pub mod frame_constants;
 pub mod gbuffer;
 pub mod gpu_renderer;
+pub mod gradient;
+pub mod gradient_atrous;
+pub mod history;
 pub mod pass;
 pub mod primary;
 pub mod realtime;
@@ -19,6 +23,9 @@ pub mod reservoirs;
 pub mod reuse;
 pub mod scene_gpu;
 pub mod settings;
+pub mod strata;
+pub mod taa;
+pub mod temporal;
 pub mod tone_map;
 pub mod tonemap;
 pub mod view_state;

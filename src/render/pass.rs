@@ -38,6 +38,11 @@ pub struct Pass {
 /// Edge of the square work groups that cover an image.
 const GROUP: u32 = 8;
 
+/// Work groups that cover an image.
+pub fn groups_over(size: (u32, u32)) -> [u32; 3] {
+    [size.0.div_ceil(GROUP), size.1.div_ceil(GROUP), 1]
+}
+
 impl Pass {
     /// Makes the pass `name` from the shader of the same stem; `traced` shaders have one compiled form per backend.
     ///
@@ -69,15 +74,29 @@ impl Pass {
     /// # Errors
     /// [`GpuError`] of the device.
     pub fn record(&self, r: &mut Recorder<'_>, uses: &[Use<'_>], groups: [u32; 3]) -> Result<(), GpuError> {
+        self.record_as(self.name, r, uses, groups)
+    }
+
+    /// The same under another label, for passes that a frame runs several times.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn record_as(
+        &self,
+        label: &'static str,
+        r: &mut Recorder<'_>,
+        uses: &[Use<'_>],
+        groups: [u32; 3],
+    ) -> Result<(), GpuError> {
         r.tracker.pass(r.cmd, uses)?;
-        let sets = [r.scene.sets.raw(0), r.gbuffer.sets.raw(0)];
+        let sets = [r.scene.sets.raw(0), r.gbuffer.sets.raw(r.gbuffer.parity)];
         let run = |cmd: &Commands<'_>| {
             self.pipeline.bind(cmd, &sets)?;
             self.pipeline.push(cmd, &r.push)?;
             self.pipeline.dispatch(cmd, groups)
         };
         match r.timestamps {
-            Some(timestamps) => timestamps.scope(r.cmd, self.name, run),
+            Some(timestamps) => timestamps.scope(r.cmd, label, run),
             None => run(r.cmd),
         }
     }
@@ -87,7 +106,6 @@ impl Pass {
     /// # Errors
     /// [`GpuError`] of the device.
     pub fn record_image(&self, r: &mut Recorder<'_>, uses: &[Use<'_>]) -> Result<(), GpuError> {
-        let (w, h) = r.gbuffer.size;
-        self.record(r, uses, [w.div_ceil(GROUP), h.div_ceil(GROUP), 1])
+        self.record(r, uses, groups_over(r.gbuffer.size))
     }
 }

@@ -31,6 +31,7 @@ impl Primary {
             g.view(),
             g.motion(),
             g.emission(),
+            g.guide().now(g.parity),
         ] {
             uses.push(Use::image(image, Access::ComputeWrite));
         }

@@ -35,8 +35,8 @@ struct Validity {
 pub struct Reservoirs {
     pub current: Buffer,
     pub history: Buffer,
-    /// Constants of the frame that left the history, and what it was made with; `None` after a frame that left none.
-    old: Option<(FrameConstants, Validity)>,
+    /// What the history was made with; `None` after a frame that left none.
+    old: Option<Validity>,
 }
 
 impl Reservoirs {
@@ -75,22 +75,15 @@ impl Reservoirs {
             soft_shadows: s.soft_shadows,
             seed: s.seed,
         };
-        let old = self.old.filter(|(_, v)| *v == validity).map(|(old, _)| old);
-        let view = old.unwrap_or(constants);
         let complete = FrameConstants {
             reservoirs: self.current.address(),
             reservoir_history: self.history.address(),
-            old_eye: view.eye,
-            old_half_width: view.half_width,
-            old_forward: view.forward,
-            old_half_height: view.half_height,
-            old_right: view.right,
-            old_up: view.up,
-            reuse_history: if old.is_some() { s.reuse_history } else { 0 },
+            reservoirs_used: 1,
+            reuse_history: if self.old == Some(validity) { s.reuse_history } else { 0 },
             reuse_neighbours: s.reuse_neighbours,
             ..constants
         };
-        self.old = Some((complete, validity));
+        self.old = Some(validity);
         complete
     }
 }

@@ -3,6 +3,7 @@
 
 use super::pass::{Pass, PassContext, Recorder};
 use super::reservoirs::Reservoirs;
+use super::strata::Strata;
 use crate::gpu::{Access, Buffer, GpuError, Use};
 
 /// The pass.
@@ -21,7 +22,13 @@ impl Reuse {
     ///
     /// # Errors
     /// [`GpuError`] of the device.
-    pub fn record(&self, r: &mut Recorder<'_>, counters: &Buffer, reservoirs: &Reservoirs) -> Result<(), GpuError> {
+    pub fn record(
+        &self,
+        r: &mut Recorder<'_>,
+        counters: &Buffer,
+        reservoirs: &Reservoirs,
+        strata: &Strata,
+    ) -> Result<(), GpuError> {
         let g = r.gbuffer;
         let uses = [
             Use::image(g.position(), Access::ComputeRead),
@@ -29,6 +36,7 @@ impl Reuse {
             Use::buffer(&reservoirs.current, Access::ComputeRead),
             Use::buffer(&reservoirs.history, Access::ComputeWrite),
             Use::buffer(counters, Access::ComputeReadWrite),
+            Use::buffer(&strata.buffer, Access::ComputeWrite),
         ];
         self.0.record_image(r, &uses)
     }

@@ -14,9 +14,10 @@ use crate::gpu::{
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
-use crate::scene::records::{Instance, NONE, TextureInfo};
+use crate::scene::records::{Instance, Light, NONE, TextureInfo};
 use ash::vk;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use thiserror::Error;
 
 /// Why a scene cannot be put on the GPU or rendered there.
@@ -101,6 +102,7 @@ pub struct SceneGpu {
     _sampler: Sampler,
     pub layout: Arc<DescriptorLayout>,
     pub sets: DescriptorSets,
+    revision: AtomicU32,
 }
 
 fn upload<T: bytemuck::NoUninit>(
@@ -307,11 +309,30 @@ impl SceneGpu {
             _sampler: sampler,
             layout,
             sets,
+            revision: AtomicU32::new(0),
         })
     }
 }
 
 impl SceneGpu {
+    /// Replaces lights from number `first` on, whose places and extents must stay within what the scene's rows and tree know of
+    /// them: made for lights that change their colour or go out. Must not be called while a frame of this scene runs.
+    ///
+    /// # Errors
+    /// [`GpuError`], where they do not fit above all.
+    pub fn update_lights(&self, first: usize, lights: &[Light]) -> Result<(), GpuError> {
+        let mut batch = UploadBatch::new(&self.device, STAGING)?;
+        batch.buffer(&self.lights, (first * size_of::<Light>()) as u64, lights)?;
+        batch.finish()?;
+        self.revision.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Number of changes so far.
+    pub fn revision(&self) -> u32 {
+        self.revision.load(Ordering::Relaxed)
+    }
+
     /// Constants of a frame as far as scene and view decide them; the rest is zero.
     pub fn constants(&self, camera: &Camera, size: (u32, u32)) -> FrameConstants {
         let axes = camera.axes();

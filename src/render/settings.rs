@@ -52,6 +52,8 @@ pub struct Settings {
     pub candidates: u32,
     /// Reuse light samples between pixels and frames, where they are resampled and frames are shown as they come.
     pub light_reuse: bool,
+    /// Reuse them where frames are denoised, too.
+    pub reuse_denoised: bool,
     /// Frames' worth of candidates that the history of reuse counts at most.
     pub reuse_history: u32,
     /// Neighbours whose samples a pixel reuses.
@@ -72,6 +74,20 @@ pub struct Settings {
     pub tonemap: Tonemap,
     /// Index into [`crate::console::cvars::VIEWS`].
     pub view: u32,
+    /// Denoise frames that are shown as they come.
+    pub denoiser: bool,
+    /// Let the denoiser see where the light has changed since the frame before.
+    pub gradients: bool,
+    /// Levels of the denoiser's filter.
+    pub atrous_levels: u32,
+    /// Least weight of a new frame in the denoiser's history.
+    pub least_alpha: f32,
+    /// Most that a light sample may exceed its surroundings by, standard deviations; 0: anything.
+    pub fireflies: f32,
+    /// Temporal anti-aliasing of frames that are shown as they come.
+    pub taa: bool,
+    /// Half width of the TAA clip in standard deviations.
+    pub taa_gamma: f32,
     /// Select texture levels by the ray's footprint; else level 0.
     pub filter_textures: bool,
 }
@@ -86,6 +102,22 @@ impl Settings {
     }
 }
 
+/// Most levels of the denoiser's filter.
+const MOST_LEVELS: u32 = 5;
+/// First of the views of the denoiser's filter levels in [`crate::console::cvars::VIEWS`].
+const FIRST_LEVEL_VIEW: u32 = 18;
+
+impl Settings {
+    /// Levels of the denoiser's filter that a frame runs: a view of a level ends there.
+    pub fn shown_levels(&self) -> u32 {
+        let levels = self.atrous_levels.min(MOST_LEVELS);
+        match self.view.checked_sub(FIRST_LEVEL_VIEW) {
+            Some(level) => (level + 1).min(levels),
+            None => levels,
+        }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -95,6 +127,7 @@ impl Default for Settings {
             light_sampling: LightSampling::Reservoir,
             candidates: 2,
             light_reuse: true,
+            reuse_denoised: false,
             reuse_history: 20,
             reuse_neighbours: 1,
             ambient: AmbientLight::Grid,
@@ -107,6 +140,13 @@ impl Default for Settings {
             exposure: 0.0,
             tonemap: Tonemap::Aces,
             view: 0,
+            denoiser: true,
+            gradients: true,
+            atrous_levels: 5,
+            least_alpha: 0.05,
+            fireflies: 0.0,
+            taa: true,
+            taa_gamma: 2.0,
             filter_textures: true,
         }
     }

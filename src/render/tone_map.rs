@@ -35,6 +35,12 @@ impl ToneMap {
             g.direct(),
             g.composite(),
             g.mean(),
+            g.motion(),
+            g.filter_a(),
+            g.filter_b(),
+            g.gradient_a(),
+            g.moments().now(g.parity),
+            g.taa().now(g.parity),
         ] {
             uses.push(Use::image(image, Access::ComputeRead));
         }

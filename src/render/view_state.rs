@@ -2,7 +2,9 @@
 
 use super::frame_constants::FrameConstants;
 use super::gbuffer::GBuffer;
+use super::history::FrameHistory;
 use super::reservoirs::Reservoirs;
+use super::strata::Strata;
 use crate::gpu::{Buffer, DescriptorLayout, Device, GpuError, MemoryKind, Tracker};
 use crate::reference::direct::RayCounts;
 use ash::vk;
@@ -24,6 +26,10 @@ pub struct ViewState {
     pub counters: Vec<Buffer>,
     /// Made when samples are first reused.
     pub reservoirs: Option<Reservoirs>,
+    pub strata: Strata,
+    pub history: FrameHistory,
+    /// Whether the last frame shows the image `taa`, else `composite`.
+    pub anti_aliased: bool,
 }
 
 impl ViewState {
@@ -65,6 +71,9 @@ impl ViewState {
             focus,
             counters,
             reservoirs: None,
+            strata: Strata::new(device, size)?,
+            history: FrameHistory::default(),
+            anti_aliased: false,
         })
     }
 

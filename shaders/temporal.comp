@@ -1,0 +1,149 @@
+#version 460
+// Temporal stage of the denoiser (A-SVGF: Schied, Peters and Dachsbacher 2018; SVGF: Schied et al. 2017, section 4.1 and 4.2):
+// irradiance and moments of its luminance blended with those of the same surface in the frame before, and the variance of the
+// result.
+//
+// The weight of the new frame is the inverse of the number of frames, but not less than `rt_leastAlpha`; where the gradient
+// says that the light has changed, it rises to 1 and the number of frames shrinks with it.
+#extension GL_GOOGLE_include_directive : require
+#include "prelude.glsl"
+#include "gbuffer.glsl"
+#include "camera_motion.glsl"
+#include "guide.glsl"
+#include "luminance.glsl"
+#include "packed.glsl"
+#include "gradient.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// Farther than this off the surface's plane a sample of the frame before belongs to another surface: a share of its depth
+// and units.
+const vec2 OFF_PLANE = vec2(0.004, 0.25);
+const float LEAST_COSINE = 0.9;
+// With fewer frames the variance is estimated over the surroundings.
+const float FEW_FRAMES = 4.0;
+const int SURROUNDINGS = 3;
+
+struct Past {
+    vec3 irradiance;
+    // Share of one sample's variance that the mean has.
+    float share;
+    vec2 moments;
+    float frames;
+};
+
+// `at` and `normal`: the surface along the axes of the view before.
+bool same_surface(ivec2 q, uint id, vec3 at, vec3 normal) {
+    if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(FC.size)))) return false;
+    Guide other = unpack_guide(imageLoad(old_guide, q));
+    if (other.depth <= 0.0 || other.id != id || dot(other.normal, normal) < LEAST_COSINE) return false;
+    vec3 there = old_view_point(vec2(q) + jitter_before(), other.depth);
+    return abs(dot(there - at, normal)) < OFF_PLANE.x * at.z + OFF_PLANE.y;
+}
+
+void add(inout Past past, inout float weights, ivec2 q, float weight) {
+    vec4 moments = imageLoad(moments_before, q);
+    past.irradiance += unpack_colour(imageLoad(irradiance_before, q)).rgb * weight;
+    past.share += moments.w * weight;
+    past.moments += moments.xy * weight;
+    past.frames += moments.z * weight;
+    weights += weight;
+}
+
+// What the surface of a pixel had in the frame before; no frames where it was not seen.
+Past past_of(ivec2 p, Guide g) {
+    Past past = Past(vec3(0.0), 1.0, vec2(0.0), 0.0);
+    if (FC.history == 0) return past;
+    // From the depth rather than the G-buffer's position and motion: memory is what bounds this pass.
+    vec3 here = view_point(vec2(p) + jitter_now(), g.depth);
+    vec3 point = FC.eye + FC.right * here.x + FC.up * here.y + FC.forward * here.z;
+    vec2 motion = FC.still != 0 ? vec2(0.0) : motion_of(point);
+    if (abs(motion.x) > float(FC.size.x) || abs(motion.y) > float(FC.size.y)) return past;
+    vec3 at = to_old_view(point - FC.old_eye);
+    vec3 normal = to_old_view(FC.right * g.normal.x + FC.up * g.normal.y + FC.forward * g.normal.z);
+    Past sum = Past(vec3(0.0), 0.0, vec2(0.0), 0.0);
+    float weights = 0.0;
+    vec2 place = vec2(p) + motion;
+    ivec2 first = ivec2(floor(place));
+    vec2 part = place - vec2(first);
+    for (int i = 0; i < 4; i++) {
+        ivec2 step_ = ivec2(i & 1, i >> 1);
+        vec2 near = mix(1.0 - part, part, vec2(step_));
+        float weight = near.x * near.y;
+        if (weight > 1e-3 && same_surface(first + step_, g.id, at, normal)) add(sum, weights, first + step_, weight);
+    }
+    if (weights < 0.05) {
+        // None of the four nearest shows the surface: its edge may have run between them.
+        ivec2 centre = ivec2(round(place));
+        for (int i = 0; i < 9; i++) {
+            ivec2 q = centre + ivec2(i % 3 - 1, i / 3 - 1);
+            if (same_surface(q, g.id, at, normal)) add(sum, weights, q, 0.1);
+        }
+    }
+    if (weights <= 0.0) return past;
+    return Past(sum.irradiance / weights, sum.share / weights, sum.moments / weights, sum.frames / weights);
+}
+
+// Mean and second moment of the luminance of this frame's samples around a pixel on the same surface.
+vec3 surroundings(ivec2 p, Guide g, int reach, bool itself) {
+    vec3 at = view_point(vec2(p) + jitter_now(), g.depth);
+    vec3 normal = g.normal;
+    vec3 sum = vec3(0.0);
+    [[dont_unroll]] for (int y = -reach; y <= reach; y++) {
+        [[dont_unroll]] for (int x = -reach; x <= reach; x++) {
+            ivec2 q = p + ivec2(x, y);
+            if (!itself && q == p) continue;
+            if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(FC.size)))) continue;
+            Guide other = unpack_guide(imageLoad(guide, q));
+            if (other.depth <= 0.0 || dot(other.normal, g.normal) < LEAST_COSINE) continue;
+            vec3 there = view_point(vec2(q) + jitter_now(), other.depth);
+            if (abs(dot(there - at, normal)) > OFF_PLANE.x * at.z + OFF_PLANE.y) continue;
+            float l = luminance(imageLoad(image_direct, q).rgb);
+            sum += vec3(l, l * l, 1.0);
+        }
+    }
+    return sum;
+}
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (any(greaterThanEqual(pixel, FC.size))) return;
+    ivec2 p = ivec2(pixel);
+    Guide g = unpack_guide(imageLoad(guide, p));
+    vec3 sampled = imageLoad(image_direct, p).rgb;
+    // History keeps what it is given for ever.
+    if (any(isnan(sampled)) || any(isinf(sampled))) sampled = vec3(0.0);
+    if (g.depth <= 0.0) {
+        imageStore(filter_a, p, uvec4(0));
+        imageStore(moments_now, p, vec4(0.0, 0.0, 0.0, 1.0));
+        if (FC.filter_levels == 0) imageStore(irradiance_now, p, uvec4(0));
+        return;
+    }
+    if (FC.fireflies > 0.0) {
+        // Without the sample itself, which would raise the bound that it is held against.
+        vec3 around = surroundings(p, g, SURROUNDINGS, false);
+        float own = luminance(sampled);
+        vec2 others = around.xy / max(around.z, 1.0);
+        float most = others.x + FC.fireflies * sqrt(max(others.y - others.x * others.x, 0.0));
+        if (around.z > 3.0 && own > most) sampled *= most / own;
+    }
+    float l = luminance(sampled);
+    Past past = past_of(p, g);
+    float change = gradient_at(p);
+    float frames = past.frames * (1.0 - change) + 1.0;
+    float alpha = past.frames <= 0.0 ? 1.0 : mix(max(1.0 / frames, FC.least_alpha), 1.0, change);
+    vec3 irradiance = mix(past.irradiance, sampled, alpha);
+    vec2 moments = mix(past.moments, vec2(l, l * l), alpha);
+    float share = (1.0 - alpha) * (1.0 - alpha) * past.share + alpha * alpha;
+    float variance = max(moments.y - moments.x * moments.x, 0.0);
+    if (frames < FEW_FRAMES) {
+        vec3 around = surroundings(p, g, SURROUNDINGS, true);
+        vec2 mean = around.xy / max(around.z, 1.0);
+        variance = max(variance, max(mean.y - mean.x * mean.x, 0.0));
+    }
+    uvec4 result = pack_colour(irradiance, variance * share);
+    imageStore(filter_a, p, result);
+    imageStore(moments_now, p, vec4(moments, frames, share));
+    // Where the filter has levels, the first one's result is what the next frame starts from.
+    if (FC.filter_levels == 0) imageStore(irradiance_now, p, result);
+}

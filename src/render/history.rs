@@ -1,0 +1,109 @@
+//! What a frame knows of the one before: where it was seen from, whether its histories are still good, and where in the
+//! pixels its rays go.
+
+use super::frame::FrameInput;
+use super::frame_constants::FrameConstants;
+use super::settings::{Settings, Tonemap};
+
+/// Frames that nothing must have changed for until temporal anti-aliasing takes the image for a still one.
+const SETTLED: u32 = 1;
+
+/// What histories depend on besides view and scene: when it changes they start anew.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    settings: Settings,
+    reuses: bool,
+    /// Averaged frames leave no histories.
+    filtered: bool,
+}
+
+/// The frame before, as one view remembers it.
+#[derive(Default)]
+pub struct FrameHistory {
+    before: Option<(FrameConstants, Key)>,
+    revision: u32,
+    unchanged: u32,
+}
+
+/// The settings that decide what is in the histories: not how they are shown.
+fn key(input: &FrameInput) -> Key {
+    let shown = Settings {
+        exposure: 0.0,
+        tonemap: Tonemap::Aces,
+        view: 0,
+        ..input.settings
+    };
+    Key {
+        settings: shown,
+        reuses: input.reuses(),
+        filtered: input.denoises() || input.anti_aliases(),
+    }
+}
+
+/// Points that fill the pixel evenly however many are taken (Roberts 2018, the R2 sequence).
+fn jitter(index: u32) -> [f32; 2] {
+    const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    STEPS.map(|step| (0.5 + f64::from(index) * step).fract() as f32)
+}
+
+impl FrameHistory {
+    /// Completes a frame's constants with what it needs of the frame before, and remembers it. `revision` counts changes of
+    /// the scene.
+    pub fn advance(&mut self, constants: FrameConstants, input: &FrameInput, revision: u32) -> FrameConstants {
+        let key = key(input);
+        let (view, good) = match &self.before {
+            Some((before, old)) => (*before, key.filtered && *old == key),
+            None => (constants, false),
+        };
+        let same_view = good
+            && view.eye == constants.eye
+            && view.forward == constants.forward
+            && view.right == constants.right
+            && view.half_width == constants.half_width
+            && view.half_height == constants.half_height;
+        self.unchanged = if same_view && revision == self.revision {
+            self.unchanged.saturating_add(1)
+        } else {
+            0
+        };
+        let changed = revision != self.revision;
+        self.revision = revision;
+        let jitter = match (input.anti_aliases(), input.denoises()) {
+            (true, _) if input.settings.antialiasing => jitter(input.sample_index),
+            (false, false) => [-1.0; 2],
+            _ => [0.5; 2],
+        };
+        let complete = FrameConstants {
+            old_eye: view.eye,
+            old_half_width: view.half_width,
+            old_forward: view.forward,
+            old_half_height: view.half_height,
+            old_right: view.right,
+            old_up: view.up,
+            jitter,
+            old_jitter: if good { view.jitter } else { jitter },
+            history: u32::from(good),
+            changed: u32::from(good && changed && input.denoises() && input.settings.gradients),
+            still: u32::from(self.unchanged >= SETTLED),
+            ..constants
+        };
+        self.before = Some((complete, key));
+        complete
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jitter_fills_the_pixel() {
+        let mut cells = [0; 16];
+        for i in 0..64 {
+            let [x, y] = jitter(i);
+            assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
+            cells[(x * 4.0) as usize + 4 * (y * 4.0) as usize] += 1;
+        }
+        assert!(cells.iter().all(|n| (2..=6).contains(n)), "{cells:?}");
+    }
+}
