@@ -34,18 +34,24 @@ void main() {
     vec3 direct = albedo.rgb * irradiance;
     vec3 emission = imageLoad(image_emission, p).rgb;
     if (FC.illumination == 0 && albedo.rgb != vec3(0.0)) emission = vec3(0.0);
-    vec3 radiance = direct + emission;
+    vec3 share = imageLoad(image_share, p).rgb;
+    vec3 layers = imageLoad(image_layers, p).rgb;
+    direct *= share;
+    emission *= share;
+    vec3 radiance = direct + emission + layers;
     imageStore(image_composite, p, vec4(radiance, albedo.a));
     if (accumulated == 0) return;
     vec4 mean = vec4(0.0);
     vec4 compensation = vec4(0.0);
     vec3 sum_direct = vec3(0.0);
     vec3 sum_emission = vec3(0.0);
+    vec3 sum_layers = vec3(0.0);
     if (accumulated > 1) {
         mean = imageLoad(image_mean, p);
         compensation = imageLoad(image_compensation, p);
         sum_direct = imageLoad(image_mean_direct, p).rgb;
         sum_emission = imageLoad(image_mean_emission, p).rgb;
+        sum_layers = imageLoad(image_mean_layers, p).rgb;
         vec3 delta = radiance - mean.rgb / float(accumulated - 1);
         mean.a += dot(delta, delta) * (float(accumulated - 1) / float(accumulated)) / 3.0;
     }
@@ -54,4 +60,5 @@ void main() {
     imageStore(image_compensation, p, compensation);
     imageStore(image_mean_direct, p, vec4(sum_direct + direct, 0.0));
     imageStore(image_mean_emission, p, vec4(sum_emission + emission, 0.0));
+    imageStore(image_mean_layers, p, vec4(sum_layers + layers, 0.0));
 }

@@ -2,6 +2,7 @@
 // Direct stage: next-event estimation over the lights of the receiver's row, all of them or N at random.
 // Counterpart of src/reference/direct.rs.
 #extension GL_GOOGLE_include_directive : require
+#define TRACE_LAYERS
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"

@@ -38,7 +38,7 @@ void main() {
         barrier();
     }
     if (lane == 0) {
-        float wanted = clamp(KEY / exp(sums[0] / float(n)), EXPOSURE_RANGE.x, EXPOSURE_RANGE.y);
+        float wanted = clamp(sqrt(GAME_EXPOSURE * KEY / exp(sums[0] / float(n))), EXPOSURE_RANGE.x, EXPOSURE_RANGE.y);
         float before = FC.exposure.at[0];
         FC.exposure.at[0] = before > 0.0 ? before * pow(wanted / before, FC.exposure_blend) : wanted;
     }

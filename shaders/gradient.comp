@@ -6,6 +6,7 @@
 //
 // gradient_a: |Δ| of the luminance and the larger of the two, filtered apart; their ratio is the change.
 #extension GL_GOOGLE_include_directive : require
+#define TRACE_LAYERS
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"

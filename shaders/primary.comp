@@ -1,6 +1,7 @@
 #version 460
 // Primary stage: camera rays to the G-buffer.
 #extension GL_GOOGLE_include_directive : require
+#define TRACE_LAYERS
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"
@@ -8,9 +9,20 @@
 #include "surface.glsl"
 #include "camera.glsl"
 #include "gbuffer.glsl"
+#include "layers.glsl"
 #include "guide.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
+// Where a point of a moving instance was in the frame before.
+vec3 old_position_of(Instance i, Hit hit) {
+    Triangle t = FC.triangles.at[hit.triangle];
+    vec2 b = hit.barycentrics;
+    vec3 p = FC.positions.at[t.vertices[0]] * (1.0 - b.x - b.y) + FC.positions.at[t.vertices[1]] * b.x
+           + FC.positions.at[t.vertices[2]] * b.y;
+    vec4 q = vec4(p, 1.0);
+    return vec3(dot(i.old_object_to_world[0], q), dot(i.old_object_to_world[1], q), dot(i.old_object_to_world[2], q));
+}
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -18,8 +30,11 @@ void main() {
     ivec2 p = ivec2(pixel);
     vec3 origin, direction;
     camera_ray(pixel, sample_index, origin, direction);
-    Hit hit = trace_closest(origin, direction, RAY_FAR);
+    Seen seen = see(origin, direction, pixel.x + (pixel.y << 16));
+    Hit hit = seen.hit;
     imageStore(gbuffer_view, p, vec4(direction, 0.0));
+    imageStore(image_layers, p, vec4(seen.layers, 0.0));
+    imageStore(image_share, p, vec4(seen.share, 0.0));
     if (hit.triangle == NONE) {
         imageStore(gbuffer_albedo, p, vec4(0.0));
         imageStore(gbuffer_position, p, vec4(0.0));
@@ -30,15 +45,22 @@ void main() {
         imageStore(guide, p, uvec4(0));
         return;
     }
-    SurfaceHit s = surface_at(hit, direction, FC.cone);
+    SurfaceHit s = seen.surface;
     imageStore(gbuffer_albedo, p, vec4(s.albedo, 1.0));
     imageStore(gbuffer_position, p, vec4(s.position, hit.t));
     imageStore(gbuffer_surface, p, uvec4(pack_normal(s.shading_normal), pack_normal(s.geometric_normal), s.material, s.row));
     imageStore(gbuffer_object, p, uvec4(hit.triangle, hit.instance, packUnorm2x16(hit.barycentrics), s.cluster));
-    imageStore(image_emission, p, vec4(emission_seen(s, direction), 0.0));
+    imageStore(image_emission, p, vec4(seen.emission, 0.0));
     // A sky's picture is infinitely far away, wherever the surface that shows it is.
     bool sky = (FC.materials.at[s.material].flags & MATERIAL_SKY) != 0;
-    imageStore(gbuffer_motion, p, vec4(sky ? motion_of_direction(direction) : motion_of(s.position), hit.t, 0.0));
+    vec2 motion = sky ? motion_of_direction(direction) : motion_of(s.position);
+    vec3 old_position = s.position;
+    Instance instance = FC.instances.at[hit.instance];
+    if (instance.moves != 0) {
+        old_position = old_position_of(instance, hit);
+        motion = motion_between(s.position - FC.eye, old_position - FC.old_eye);
+    }
+    imageStore(gbuffer_motion, p, vec4(motion, hit.t, dot(old_position - FC.old_eye, FC.old_forward)));
     float depth = s.albedo == vec3(0.0) ? 0.0 : dot(s.position - FC.eye, FC.forward);
     imageStore(guide, p, pack_guide(depth, to_view(s.shading_normal), s.material, hit.instance));
 }

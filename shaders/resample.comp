@@ -6,6 +6,7 @@
 // (their section 4.3), with shadow rays where visibility decides about that. Candidates are made without regard to
 // visibility, a stored sample is one that was in view of its own receiver.
 #extension GL_GOOGLE_include_directive : require
+#define TRACE_LAYERS
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"
@@ -96,7 +97,7 @@ void resample(SurfaceHit at, float distance, uint address, inout Reservoir kept,
             origin = offset_point(before.position, before.geometric_normal);
         }
         counts.x++;
-        bool free = visible(origin, s);
+        bool free = visible(origin, s) != vec3(0.0);
         if (ray == 1) in_view = free;
         else if (!free) old_target = 0.0;
     }

@@ -5,6 +5,7 @@
 // Unbiased in the same way as resample.comp, which explains it: here all techniques make samples that are in view of their
 // receivers.
 #extension GL_GOOGLE_include_directive : require
+#define TRACE_LAYERS
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"
@@ -69,8 +70,10 @@ vec3 reuse(uvec2 pixel, float distance, inout Reservoir own, inout uvec2 counts)
     LightSample s = sample_point(point, at);
     float numerator = target;
     float denominator = own_count * target;
-    // The first ray asks for the pixel itself, then one for each technique that could have made the sample.
-    [[dont_unroll]] for (uint k = source == NONE ? 1 : 0; k < 1 + wanted; k++) {
+    // The first ray asks for the pixel itself, then one for each technique that could have made the sample. Its own sample is
+    // known to arrive, but not in which colour.
+    vec3 share = vec3(1.0);
+    [[dont_unroll]] for (uint k = source == NONE && FC.light_filters == 0 ? 1 : 0; k < 1 + wanted; k++) {
         vec3 origin = offset_point(at.position, at.geometric_normal);
         LightSample asked = s;
         float t = 0.0;
@@ -92,12 +95,14 @@ vec3 reuse(uvec2 pixel, float distance, inout Reservoir own, inout uvec2 counts)
             origin = offset_point(there.position, there.geometric_normal);
         }
         counts.x++;
-        bool free = visible(origin, asked);
+        vec3 arrives = visible(origin, asked);
+        bool free = arrives != vec3(0.0);
         if (k == 0 && !free) return vec3(0.0);
+        if (k == 0) share = arrives;
         if (k > 0 && free) denominator += count * t;
     }
     own.weight = sum / target * (numerator / denominator);
-    return s.value * own.weight;
+    return s.value * share * own.weight;
 }
 
 void main() {

@@ -60,6 +60,13 @@ Past past_of(ivec2 p, Guide g) {
     vec2 motion = FC.still != 0 ? vec2(0.0) : motion_of(point);
     if (abs(motion.x) > float(FC.size.x) || abs(motion.y) > float(FC.size.y)) return past;
     vec3 at = to_old_view(point - FC.old_eye);
+    if (FC.moving != 0) {
+        vec4 m = imageLoad(gbuffer_motion, p);
+        motion = m.xy;
+        vec2 s = (vec2(p) + jitter_now() + motion) / vec2(FC.size) * 2.0 - 1.0;
+        at = vec3(s.x * FC.old_half_width, -s.y * FC.old_half_height, 1.0) * m.w;
+        if (abs(motion.x) > float(FC.size.x) || abs(motion.y) > float(FC.size.y)) return past;
+    }
     vec3 normal = to_old_view(FC.right * g.normal.x + FC.up * g.normal.y + FC.forward * g.normal.z);
     Past sum = Past(vec3(0.0), 0.0, vec2(0.0), 0.0);
     float weights = 0.0;

@@ -38,19 +38,8 @@ fn receivers(scene: &Scene, count: u32) -> Vec<SurfaceHit> {
             let (u, v) = (unit(pcg(i + 1000)) * 0.5, unit(pcg(i + 2000)) * 0.5);
             let position = a + (b - a) * u + (c - a) * v;
             let normal = (b - a).cross(c - a).normalize_or(Vec3::Z);
-            let (cluster, row) = classify(scene, position, normal, g.triangles[triangle as usize].fallback_row);
-            SurfaceHit {
-                position,
-                geometric_normal: normal,
-                shading_normal: normal,
-                uv: glam::Vec2::ZERO,
-                albedo: Vec3::ONE,
-                material: 0,
-                triangle,
-                front: true,
-                cluster,
-                row,
-            }
+            let (_, row) = classify(scene, position, normal, g.triangles[triangle as usize].fallback_row);
+            SurfaceHit::receiver(position, normal, row)
         })
         .collect()
 }

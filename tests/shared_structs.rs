@@ -6,8 +6,8 @@ use q3rays::render::frame_constants::{FrameConstants, Push};
 use q3rays::render::reservoirs::Reservoir;
 use q3rays::render::strata::Stratum;
 use q3rays::scene::records::{
-    AmbientCube, BspNode, CellEntry, Instance, Light, LightCell, LightNode, LightRow, LightRun, Material, TextureInfo,
-    Triangle, VertexAttributes,
+    AmbientCube, BspNode, CellEntry, Instance, Light, LightCell, LightNode, LightRow, LightRun, Material, Stage, TcMod,
+    TextureInfo, Triangle, VertexAttributes, Wave,
 };
 use std::collections::{BTreeMap, HashMap};
 use std::mem::offset_of;
@@ -92,7 +92,12 @@ macro_rules! record {
 
 fn records() -> Vec<Record> {
     vec![
-        record!(VertexAttributes { normal, uv, color }),
+        record!(VertexAttributes {
+            normal,
+            uv,
+            lightmap_uv,
+            color
+        }),
         record!(Triangle {
             vertices,
             material,
@@ -105,16 +110,55 @@ fn records() -> Vec<Record> {
             alpha_scale,
             alpha_offset,
             emission,
+            shown,
             emission_texture,
-            sky
+            sky,
+            first_stage,
+            stage_count,
+            alpha_stage,
+            sky_scale,
+            cloud_height
+        }),
+        record!(Wave {
+            function,
+            base,
+            amplitude,
+            phase,
+            rate
+        }),
+        record!(TcMod {
+            kind,
+            rates,
+            matrix,
+            offset,
+            wave
+        }),
+        record!(Stage {
+            textures,
+            frames,
+            frame_rate,
+            flags,
+            source,
+            destination,
+            rgb_source,
+            alpha_source,
+            tc_gen,
+            rgb,
+            alpha,
+            rgb_wave,
+            alpha_wave,
+            tc_vectors,
+            first_mod,
+            mod_count
         }),
         record!(Instance {
             object_to_world,
             world_to_object,
+            old_object_to_world,
             first_triangle,
             mesh,
             identity,
-            padding
+            moves
         }),
         record!(Light {
             kind,
@@ -205,6 +249,8 @@ fn records() -> Vec<Record> {
             attributes,
             triangles,
             materials,
+            stages,
+            tc_mods,
             instances,
             lights,
             bsp_nodes,
@@ -284,7 +330,11 @@ fn records() -> Vec<Record> {
             reservoirs_used,
             changed,
             filter_levels,
-            padding
+            clock,
+            choose_layers,
+            light_filters,
+            shown_emission,
+            moving
         }),
         record!(Push {
             frame,

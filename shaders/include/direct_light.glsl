@@ -24,7 +24,7 @@ vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
         return vec3(0.0);
     }
     counts.x++;
-    return visible(offset_point(at.position, at.geometric_normal), s) ? s.value : vec3(0.0);
+    return visible(offset_point(at.position, at.geometric_normal), s) * s.value;
 }
 
 // One light resampled from candidates in proportion to what they give without visibility.

@@ -7,12 +7,14 @@
 // | surface | shading normal and geometric normal (octahedral, 2 x 16 bits), material, light row |
 // | object | global triangle, instance, barycentrics (2 x 16 bits), PVS cluster |
 // | view | direction of the ray |
-// | motion | previous − current image position, pixels, y down; distance along the ray, 0 for none |
+// | motion | previous − current image position, pixels, y down; distance along the ray, 0 for none; view depth in the frame before |
 // | emission | radiance emitted towards the eye |
+// | share | share of the surface's light that comes through the layers before it |
+// | layers | radiance of those layers |
 // | direct | irradiance/π by direct light, not multiplied with the albedo |
 // | composite | radiance of the pixel |
 // | mean, compensation | accumulated radiance: see accumulate.comp |
-// | mean_direct, mean_emission | accumulated shares |
+// | mean_direct, mean_emission, mean_layers | accumulated shares |
 // | display | encoded output |
 // | filter_a, filter_b | denoiser: irradiance/π; variance of its luminance (packed.glsl) |
 // | gradient_a, gradient_b | one texel per stratum of 3 x 3 pixels: |Δ| of the luminance; the larger luminance |
@@ -41,14 +43,17 @@ layout(set = 1, binding = 14, rgba16ui) uniform uimage2D filter_a;
 layout(set = 1, binding = 15, rgba16ui) uniform uimage2D filter_b;
 layout(set = 1, binding = 16, rgba32f) uniform image2D gradient_a;
 layout(set = 1, binding = 17, rgba32f) uniform image2D gradient_b;
-layout(set = 1, binding = 18, rgba16ui) uniform uimage2D guide;
-layout(set = 1, binding = 19, rgba16ui) uniform uimage2D old_guide;
-layout(set = 1, binding = 20, rgba16ui) uniform uimage2D irradiance_now;
-layout(set = 1, binding = 21, rgba16ui) uniform uimage2D irradiance_before;
-layout(set = 1, binding = 22, rgba32f) uniform image2D moments_now;
-layout(set = 1, binding = 23, rgba32f) uniform image2D moments_before;
-layout(set = 1, binding = 24, rgba32f) uniform image2D taa_now;
-layout(set = 1, binding = 25, rgba32f) uniform image2D taa_before;
+layout(set = 1, binding = 18, rgba32f) uniform image2D image_share;
+layout(set = 1, binding = 19, rgba32f) uniform image2D image_layers;
+layout(set = 1, binding = 20, rgba32f) uniform image2D image_mean_layers;
+layout(set = 1, binding = 21, rgba16ui) uniform uimage2D guide;
+layout(set = 1, binding = 22, rgba16ui) uniform uimage2D old_guide;
+layout(set = 1, binding = 23, rgba16ui) uniform uimage2D irradiance_now;
+layout(set = 1, binding = 24, rgba16ui) uniform uimage2D irradiance_before;
+layout(set = 1, binding = 25, rgba32f) uniform image2D moments_now;
+layout(set = 1, binding = 26, rgba32f) uniform image2D moments_before;
+layout(set = 1, binding = 27, rgba32f) uniform image2D taa_now;
+layout(set = 1, binding = 28, rgba32f) uniform image2D taa_before;
 
 // Octahedral map of a unit vector to 2 x 16 bits (Meyer et al. 2010).
 uint pack_normal(vec3 n) {

@@ -181,7 +181,7 @@ LightSample sample_triangle_light(Light light, SurfaceHit at, vec2 u, uint point
         r.value = light.radiance * (p.factor / (PI * cos_elevation));
     } else {
         vec2 uv = uv_at(light.triangle, p.barycentrics);
-        r.value = emitted(FC.materials.at[light.material], uv, p.direction) * (p.factor * light.scale);
+        r.value = emitted(FC.materials.at[light.material], uv, p.position, p.direction) * (p.factor * light.scale);
     }
     r.target = offset_point(p.position, p.normal);
     return r;

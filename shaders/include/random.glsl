@@ -5,6 +5,7 @@
 const uint SEQUENCE_RANDOM = 0;
 const uint DIM_PIXEL = 0;
 const uint DIM_LENS = 1;
+const uint DIM_LAYER = 0x4000;
 const uint DIM_LIGHT_PICK = 16;
 const uint DIM_LIGHT_POINT = 80;
 const uint DIM_CANDIDATE_PICK = 0x1000;

@@ -8,6 +8,7 @@ const uint NONE = 0xffffffffu;
 struct VertexAttributes {
     vec3 normal;
     vec2 uv;
+    vec2 lightmap_uv;
     uint color;
 };
 
@@ -23,6 +24,12 @@ const uint MATERIAL_SKY = 2;
 const uint MATERIAL_TWO_SIDED_EMISSION = 4;
 const uint MATERIAL_CLAMP = 8;
 const uint MATERIAL_SKY_BOX = 16;
+const uint MATERIAL_STAGES = 32;
+const uint MATERIAL_LAYER = 64;
+const uint MATERIAL_FILTER = 128;
+const uint MATERIAL_BACK = 256;
+const uint MATERIAL_NO_FRONT = 512;
+const uint MATERIAL_MOVING_EMISSION = 1024;
 
 struct Material {
     uint texture_index;
@@ -30,17 +37,91 @@ struct Material {
     float alpha_scale;
     float alpha_offset;
     vec3 emission;
+    vec3 shown;
     uint emission_texture;
     uint sky[6];
+    uint first_stage;
+    uint stage_count;
+    uint alpha_stage;
+    vec3 sky_scale;
+    float cloud_height;
+};
+
+const uint WAVE_SINE = 0;
+const uint WAVE_TRIANGLE = 1;
+const uint WAVE_SQUARE = 2;
+const uint WAVE_SAWTOOTH = 3;
+const uint WAVE_INVERSE_SAWTOOTH = 4;
+
+struct Wave {
+    uint function;
+    float base;
+    float amplitude;
+    float phase;
+    uint rate;
+};
+
+const uint TC_SCROLL = 1;
+const uint TC_TURBULENCE = 2;
+const uint TC_STRETCH = 3;
+const uint TC_ROTATE = 4;
+
+struct TcMod {
+    uint kind;
+    uint rates[2];
+    vec4 matrix;
+    vec2 offset;
+    Wave wave;
+};
+
+const uint STAGE_LIT = 1;
+const uint STAGE_CLAMP = 2;
+const uint STAGE_EMISSION = 4;
+const uint STAGE_WHITE = 8;
+const uint SOURCE_WAVE = 1;
+const uint SOURCE_VERTEX = 2;
+const uint SOURCE_ONE_MINUS_VERTEX = 3;
+const uint SOURCE_SPECULAR = 4;
+const uint SOURCE_PORTAL = 5;
+const uint TC_LIGHTMAP = 1;
+const uint TC_ENVIRONMENT = 2;
+const uint TC_VECTOR = 3;
+const uint BLEND_ZERO = 0;
+const uint BLEND_ONE = 1;
+const uint BLEND_SRC_COLOR = 2;
+const uint BLEND_ONE_MINUS_SRC_COLOR = 3;
+const uint BLEND_DST_COLOR = 4;
+const uint BLEND_ONE_MINUS_DST_COLOR = 5;
+const uint BLEND_SRC_ALPHA = 6;
+const uint BLEND_ONE_MINUS_SRC_ALPHA = 7;
+
+struct Stage {
+    uint textures[8];
+    uint frames;
+    uint frame_rate;
+    uint flags;
+    uint source;
+    uint destination;
+    uint rgb_source;
+    uint alpha_source;
+    uint tc_gen;
+    vec3 rgb;
+    float alpha;
+    Wave rgb_wave;
+    Wave alpha_wave;
+    vec3 tc_vectors[2];
+    uint first_mod;
+    uint mod_count;
 };
 
 struct Instance {
     vec4 object_to_world[3];
     vec4 world_to_object[3];
+    vec4 old_object_to_world[3];
     uint first_triangle;
     uint mesh;
     uint identity;
-    uint padding;
+    uint moves;
 };
 
 const uint LIGHT_TRIANGLE = 0;
@@ -178,6 +259,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Pos
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Attributes { VertexAttributes at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Triangles { Triangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Materials { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Stages { Stage at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TcMods { TcMod at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lights { Light at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer BspNodes { BspNode at[]; };
@@ -203,6 +286,8 @@ struct FrameConstants {
     Attributes attributes;
     Triangles triangles;
     Materials materials;
+    Stages stages;
+    TcMods tc_mods;
     Instances instances;
     Lights lights;
     BspNodes bsp_nodes;
@@ -282,7 +367,11 @@ struct FrameConstants {
     uint reservoirs_used;
     uint changed;
     uint filter_levels;
-    uint padding;
+    uint clock;
+    uint choose_layers;
+    uint light_filters;
+    uint shown_emission;
+    uint moving;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

@@ -8,6 +8,10 @@ struct SurfaceHit {
     vec3 shading_normal;
     vec2 uv;
     vec3 albedo;
+    // Radiance of stages that shine by themselves.
+    vec3 glow;
+    // Share of what is behind that shows through.
+    vec3 through;
     uint material;
     uint triangle;
     bool front;
@@ -61,7 +65,8 @@ float texture_lod(vec3 e1, vec3 e2, vec2 uv0, vec2 uv1, vec2 uv2, vec2 size, flo
     return 0.5 * log2(max(ratio, 1.17549435e-38)) + log2(max(width / max(abs(cosine), 1e-3), 1.17549435e-38));
 }
 
-SurfaceHit surface_at(Hit hit, vec3 direction, float cone) {
+// A hit as far as geometry and material go; `cluster` and `row` are left to `surface_at`.
+SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
     SurfaceHit s;
     Instance instance = FC.instances.at[hit.instance];
     Triangle t = FC.triangles.at[hit.triangle];
@@ -88,23 +93,51 @@ SurfaceHit surface_at(Hit hit, vec3 direction, float cone) {
     s.uv = va.uv * b0 + vb.uv * b1 + vc.uv * b2;
     s.material = t.material;
     s.triangle = hit.triangle;
+    s.albedo = vec3(0.0);
+    s.glow = vec3(0.0);
+    s.through = vec3(0.0);
+    s.cluster = NONE;
+    s.row = t.fallback_row;
     Material material = FC.materials.at[t.material];
-    if ((material.flags & MATERIAL_SKY) != 0) {
-        s.albedo = vec3(0.0);
-    } else {
-        float lod = 0.0;
-        if (cone > 0.0) {
-            TextureInfo info = FC.textures.at[material.texture_index];
-            vec2 size = vec2(info.width, info.height);
-            float d = length(direction);
-            lod = texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, size, cone * hit.t * d,
-                              dot(s.geometric_normal, direction) / d);
-        }
-        s.albedo = sample_texture(material.texture_index, s.uv, lod, (material.flags & MATERIAL_CLAMP) != 0).rgb;
+    if ((material.flags & MATERIAL_SKY) != 0) return s;
+    float d = length(direction);
+    float width = cone * hit.t * d;
+    float cosine = dot(s.geometric_normal, direction) / d;
+    if ((material.flags & MATERIAL_STAGES) != 0) {
+        Point p;
+        p.uv = s.uv;
+        p.lightmap_uv = va.lightmap_uv * b0 + vb.lightmap_uv * b1 + vc.lightmap_uv * b2;
+        p.colour = unpackUnorm4x8(va.color) * b0 + unpackUnorm4x8(vb.color) * b1 + unpackUnorm4x8(vc.color) * b2;
+        p.position = s.position;
+        p.normal = s.shading_normal;
+        p.to_viewer = -direction / d;
+        p.distance = hit.t * d;
+        p.lod = cone > 0.0 ? texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(1.0), width, cosine) : -1e30;
+        Shade shaded = shade(material, p);
+        s.albedo = shaded.albedo;
+        s.glow = shaded.glow;
+        s.through = shaded.through;
+        return s;
     }
-    s.cluster = classify(s.position, s.geometric_normal);
-    s.row = s.cluster != NONE ? s.cluster : t.fallback_row;
+    float lod = 0.0;
+    if (cone > 0.0) {
+        TextureInfo info = FC.textures.at[material.texture_index];
+        lod = texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(info.width, info.height), width, cosine);
+    }
+    s.albedo = sample_texture(material.texture_index, s.uv, lod, (material.flags & MATERIAL_CLAMP) != 0).rgb;
     return s;
+}
+
+SurfaceHit surface_at(Hit hit, vec3 direction, float cone) {
+    SurfaceHit s = shaded_hit(hit, direction, cone);
+    s.cluster = classify(s.position, s.geometric_normal);
+    if (s.cluster != NONE) s.row = s.cluster;
+    return s;
+}
+
+// Whether a surface is drawn on the side that a ray meets.
+bool drawn(Material material, bool front) {
+    return (material.flags & (front ? MATERIAL_NO_FRONT : MATERIAL_BACK)) == (front ? 0 : MATERIAL_BACK);
 }
 
 uint sky_box_side(vec3 d, out vec2 uv) {
@@ -126,27 +159,79 @@ uint sky_box_side(vec3 d, out vec2 uv) {
     return side;
 }
 
-vec3 sky_radiance(Material material, vec3 direction) {
-    if ((material.flags & MATERIAL_SKY_BOX) == 0) return material.emission;
+vec3 sky_box(Material material, vec3 direction) {
     vec2 uv;
     uint side = sky_box_side(direction, uv);
-    return material.emission * sample_texture(material.sky[side], uv, 0.0, true).rgb;
+    return sample_texture(material.sky[side], uv, 0.0, true).rgb;
 }
 
-// Radiance that a surface emits at texture coordinates towards -direction, from the side that emits.
-vec3 emitted(Material material, vec2 uv, vec3 direction) {
-    if ((material.flags & MATERIAL_SKY) != 0) return sky_radiance(material, direction);
-    if (material.emission_texture == NONE || material.emission == vec3(0.0)) return material.emission;
+// Radiance of a sky, as it lights: clouds stand for their mean.
+vec3 sky_radiance(Material material, vec3 direction) {
+    bool box_alone = (material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES)) == MATERIAL_SKY_BOX;
+    return box_alone ? material.emission * sky_box(material, direction) : material.emission;
+}
+
+// How far away clouds are where stages ask for a place, units.
+const float CLOUD_DISTANCE = 4096.0;
+
+Point point_on_texture(vec2 uv, vec3 position, vec3 to_viewer) {
+    Point p;
+    p.uv = uv;
+    p.lightmap_uv = uv;
+    p.colour = vec4(1.0);
+    p.position = position;
+    p.normal = to_viewer;
+    p.to_viewer = to_viewer;
+    p.distance = 0.0;
+    p.lod = -1e30;
+    return p;
+}
+
+// The same as it is seen.
+vec3 sky_seen(Material material, vec3 direction) {
+    bool has_box = (material.flags & MATERIAL_SKY_BOX) != 0;
+    if (!has_box && (material.flags & MATERIAL_STAGES) == 0) {
+        return FC.shown_emission == 0 ? material.shown : material.emission;
+    }
+    vec3 picture = has_box ? sky_box(material, direction) : vec3(0.0);
+    if ((material.flags & MATERIAL_STAGES) != 0) {
+        vec3 d = normalize(direction);
+        // The cloud layer is a dome; below the horizon there is none.
+        vec2 uv = cloud_coordinates(vec3(d.xy, max(d.z, 0.0)), material.cloud_height);
+        Point p = point_on_texture(uv, d * CLOUD_DISTANCE, -d);
+        p.distance = CLOUD_DISTANCE;
+        Shade clouds = shade(material, p);
+        picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
+    }
+    return picture * (FC.shown_emission == 0 ? material.shown : material.sky_scale);
+}
+
+// What a surface emits over its factor at a point of its texture.
+vec3 emission_picture(Material material, vec2 uv, vec3 position, vec3 direction) {
+    if ((material.flags & MATERIAL_MOVING_EMISSION) != 0) {
+        return shining(material, point_on_texture(uv, position, -direction));
+    }
+    if (material.emission_texture == NONE) return vec3(1.0);
     bool clamped = (material.flags & MATERIAL_CLAMP) != 0;
-    return material.emission * sample_texture(material.emission_texture, uv, 0.0, clamped).rgb;
+    return sample_texture(material.emission_texture, uv, 0.0, clamped).rgb;
 }
 
+// Radiance that a surface emits at a point of its texture towards -direction, from the side that emits: what lights are
+// sampled with.
+vec3 emitted(Material material, vec2 uv, vec3 position, vec3 direction) {
+    if ((material.flags & MATERIAL_SKY) != 0) return sky_radiance(material, direction);
+    if (material.emission == vec3(0.0)) return vec3(0.0);
+    return material.emission * emission_picture(material, uv, position, direction);
+}
+
+// Radiance that a ray receives from a surface it hits, but for the light that the surface reflects.
 vec3 emission_seen(SurfaceHit s, vec3 direction) {
     Material material = FC.materials.at[s.material];
-    if (s.front || (material.flags & (MATERIAL_SKY | MATERIAL_TWO_SIDED_EMISSION)) != 0) {
-        return emitted(material, s.uv, direction);
-    }
-    return vec3(0.0);
+    if ((material.flags & MATERIAL_SKY) != 0) return sky_seen(material, direction);
+    vec3 factor = FC.shown_emission == 0 ? material.shown : material.emission;
+    bool emits = s.front || (material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER)) != 0;
+    if (!emits || factor == vec3(0.0)) return s.glow;
+    return s.glow + factor * emission_picture(material, s.uv, s.position, direction);
 }
 
 #endif

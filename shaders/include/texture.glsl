@@ -20,7 +20,7 @@ vec4 decode(vec4 t) {
     return vec4(FC.srgb.at[code.r], FC.srgb.at[code.g], FC.srgb.at[code.b], t.a);
 }
 
-vec4 bilinear(uint index, int level, vec2 uv, bool clamped) {
+vec4 bilinear(uint index, int level, vec2 uv, bool clamped, bool encoded) {
     TextureInfo info = FC.textures.at[index];
     ivec2 size = max(ivec2(info.width, info.height) >> level, ivec2(1));
     uv = clamped ? clamp(uv, vec2(0.0), vec2(1.0)) : uv - floor(uv);
@@ -28,25 +28,36 @@ vec4 bilinear(uint index, int level, vec2 uv, bool clamped) {
     vec2 base = floor(p);
     vec2 f = p - base;
     ivec2 q = ivec2(base);
-    vec4 a = decode(texel(index, level, q, size, clamped));
-    vec4 b = decode(texel(index, level, q + ivec2(1, 0), size, clamped));
-    vec4 c = decode(texel(index, level, q + ivec2(0, 1), size, clamped));
-    vec4 d = decode(texel(index, level, q + ivec2(1, 1), size, clamped));
+    vec4 a = texel(index, level, q, size, clamped);
+    vec4 b = texel(index, level, q + ivec2(1, 0), size, clamped);
+    vec4 c = texel(index, level, q + ivec2(0, 1), size, clamped);
+    vec4 d = texel(index, level, q + ivec2(1, 1), size, clamped);
+    if (!encoded) {
+        a = decode(a);
+        b = decode(b);
+        c = decode(c);
+        d = decode(d);
+    }
     vec4 top = a + (b - a) * f.x;
     vec4 bottom = c + (d - c) * f.x;
     return top + (bottom - top) * f.y;
 }
 
-vec4 sample_texture(uint index, vec2 uv, float lod, bool clamped) {
+// RGB decoded or as it is, alpha; `encoded` filters it as it is, too: what stages blend.
+vec4 sample_as(uint index, vec2 uv, float lod, bool clamped, bool encoded) {
     if (any(isnan(uv)) || any(isinf(uv))) return vec4(0.0);
     int levels = int(FC.textures.at[index].levels);
     lod = clamp(lod, 0.0, float(levels - 1));
     float base = floor(lod);
-    vec4 near = bilinear(index, int(base), uv, clamped);
+    vec4 near = bilinear(index, int(base), uv, clamped, encoded);
     float f = lod - base;
     if (f == 0.0) return near;
-    vec4 far = bilinear(index, int(base) + 1, uv, clamped);
+    vec4 far = bilinear(index, int(base) + 1, uv, clamped, encoded);
     return near + (far - near) * f;
+}
+
+vec4 sample_texture(uint index, vec2 uv, float lod, bool clamped) {
+    return sample_as(index, uv, lod, clamped, false);
 }
 
 vec2 uv_at(uint triangle, vec2 barycentrics) {
@@ -55,16 +66,6 @@ vec2 uv_at(uint triangle, vec2 barycentrics) {
     vec2 b = FC.attributes.at[t.vertices[1]].uv;
     vec2 c = FC.attributes.at[t.vertices[2]].uv;
     return a * (1.0 - barycentrics.x - barycentrics.y) + b * barycentrics.x + c * barycentrics.y;
-}
-
-// Alpha test of a candidate hit of an alpha-tested triangle.
-bool alpha_test(uint triangle, vec2 barycentrics) {
-    uint m = FC.triangles.at[triangle].material;
-    Material material = FC.materials.at[m];
-    if ((material.flags & MATERIAL_ALPHA_TESTED) == 0) return true;
-    bool clamped = (material.flags & MATERIAL_CLAMP) != 0;
-    float alpha = sample_texture(material.texture_index, uv_at(triangle, barycentrics), 0.0, clamped).w;
-    return alpha * material.alpha_scale + material.alpha_offset > 0.0;
 }
 
 #endif

@@ -4,7 +4,8 @@
 
 #include "luminance.glsl"
 
-const float KEY = 0.18;
+const float GAME_EXPOSURE = 255.0 / 64.0;
+const float KEY = 0.12;
 const float LUMINANCE_FLOOR = 1e-4;
 const uint EXPOSURE_CELLS = 32;
 const vec2 EXPOSURE_RANGE = vec2(0.05, 16.0);

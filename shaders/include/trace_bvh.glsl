@@ -14,7 +14,7 @@ vec3 safe_inverse(vec3 d) {
 #define TREE_TRIANGLES FC.cwbvh_triangles
 #endif
 
-const uint ALPHA_TESTED_BIT = 0x80000000u;
+const uint NOT_OPAQUE_BIT = 0x80000000u;
 
 // Möller–Trumbore on (v0, id), (e1, _), (e2, _). Accepts both sides.
 bool intersect_triangle(vec4 v0, vec3 e1, vec3 e2, vec3 origin, vec3 direction, float t_max, out float t, out vec2 uv) {
@@ -27,7 +27,7 @@ bool intersect_triangle(vec4 v0, vec3 e1, vec3 e2, vec3 origin, vec3 direction, 
     float v = dot(direction, q) * inverse;
     t = dot(e2, q) * inverse;
     uv = vec2(u, v);
-    return det != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < t_max;
+    return det != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t <= t_max;
 }
 
 // Tests a triangle of a tree's own order; true where the hit is to be kept.
@@ -39,16 +39,18 @@ bool test_triangle(uint index, vec3 origin, vec3 direction, inout Hit hit) {
     vec2 uv;
     if (!intersect_triangle(v0, e1.xyz, e2.xyz, origin, direction, hit.t, t, uv)) return false;
     uint id = floatBitsToUint(v0.w);
-#ifndef TRACE_OPAQUE
-    if ((id & ALPHA_TESTED_BIT) != 0) {
-        id &= ~ALPHA_TESTED_BIT;
-        if (!alpha_test(id, uv)) return false;
-    }
+    uint triangle = id & ~NOT_OPAQUE_BIT;
+#ifdef TRACE_LAYERS
+    if (t == hit.t && !(meets_layers && triangle < hit.triangle)) return false;
+    if (meets_layers && !comes_after(t, triangle)) return false;
 #else
-    id &= ~ALPHA_TESTED_BIT;
+    if (t == hit.t) return false;
+#endif
+#ifndef TRACE_OPAQUE
+    if ((id & NOT_OPAQUE_BIT) != 0 && !candidate_counts(triangle, uv)) return false;
 #endif
     hit.t = t;
-    hit.triangle = id;
+    hit.triangle = triangle;
     hit.barycentrics = uv;
     return true;
 }

@@ -42,6 +42,8 @@ pub struct Loop<'a> {
     pub path: &'a dyn Fn(u32) -> Camera,
     /// Average frames as long as the view stays the same.
     pub accumulate: bool,
+    /// Seconds that the scene's clock goes on from one frame to the next.
+    pub frame_time: f64,
 }
 
 /// Renders frames along a camera path. On the CPU there is no frame loop: the last view is accumulated over as many
@@ -91,11 +93,14 @@ pub fn run_frames(
     let mut accumulated = 0;
     for index in 0..count {
         let camera = path(index);
-        let still = index > 0 && camera == path(index - 1);
+        let still = index > 0 && camera == path(index - 1) && job.frame_time == 0.0;
         accumulated = if job.accumulate && still { accumulated + 1 } else { 0 };
         let input = FrameInput {
             camera,
-            settings: *job.settings,
+            settings: Settings {
+                clock: job.settings.clock.after(f64::from(index) * job.frame_time),
+                ..*job.settings
+            },
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,
@@ -167,6 +172,7 @@ pub fn run(
         count: FRAMES,
         path: &path,
         accumulate: true,
+        frame_time: 0.0,
     };
     let run = run_frames(&prepared, &job, progress, &|text| eprintln!("{text}"))?;
     let stats = run_stats(engine, cvars, &scene.name, SIZE, run.frames);

@@ -12,9 +12,11 @@ use crate::output::stats::{FrameStats, Summary};
 use crate::render::frame::FrameInput;
 use crate::render::realtime::{FRAMES_IN_FLIGHT, Realtime};
 use crate::render::scene_gpu::SceneGpu;
+use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
+use crate::scene::clock::Clock;
 use crate::scene::spawns::first_view;
 use ash::vk;
 use std::collections::VecDeque;
@@ -97,6 +99,8 @@ struct Shown {
     frame: u32,
     /// Samples in the accumulation; 0 when something moved.
     accumulated: u32,
+    /// Time of the scene, seconds.
+    time: f64,
 }
 
 fn present_mode(cvars: &Cvars) -> PresentMode {
@@ -151,6 +155,7 @@ impl Shown {
             recent: VecDeque::new(),
             frame: 0,
             accumulated: 0,
+            time: 0.0,
         })
     }
 
@@ -190,11 +195,17 @@ impl Shown {
             .resize((size.width, size.height))
             .map_err(CliError::failed)?;
         let accumulate = cvars.number("rt_accumulate") != 0.0 || cvars.number("rt_refine") != 0.0;
+        if !accumulate && cvars.number("rt_pause") == 0.0 {
+            self.time += f64::from(seconds) * cvars.number("timescale");
+        }
         let still = accumulate && !moved && before == (size.width, size.height);
         self.accumulated = if still { self.accumulated + 1 } else { 0 };
         let input = FrameInput {
             camera: self.camera,
-            settings: settings(cvars),
+            settings: Settings {
+                clock: Clock::from_seconds(self.time),
+                ..settings(cvars)
+            },
             sample_index: self.frame,
             accumulated: self.accumulated,
             exposure_blend: (EXPOSURE_RATE * seconds).min(1.0),

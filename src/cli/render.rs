@@ -10,8 +10,10 @@ use crate::output::stats::FrameStats;
 use crate::output::{OutputError, atomic, exr_file, picture};
 use crate::reference::direct::RayCounts;
 use crate::render::film::{Aovs, Film};
+use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
+use crate::scene::clock::Clock;
 use crate::scene::spawns::{overview, view};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -47,7 +49,7 @@ pub struct Args {
     /// Run the real-time loop for N frames and write the last
     #[arg(long, value_name = "N", conflicts_with = "spp", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
-    /// Scene clock of the first frame, seconds (nothing in a scene moves yet)
+    /// Scene clock of the first frame, seconds
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     time: Option<f64>,
     /// Frames per second of the scene clock; without it the clock stands still
@@ -137,7 +139,7 @@ fn write_aovs(folder: &Path, film: &Film, aovs: &Aovs) -> Result<(), OutputError
         ("direct", exr_file::rgb(&film.direct)),
         ("indirect", exr_file::rgb(&dark)),
         ("emission", exr_file::rgb(&film.emission)),
-        ("transparent", exr_file::rgb(&dark)),
+        ("transparent", exr_file::rgb(&film.transparent)),
     ] {
         exr_file::write(
             &folder.join(format!("{name}.exr")),
@@ -177,7 +179,10 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     // An output that cannot be written is told before the work is done, not after it.
     atomic::create_parent(&args.out).map_err(CliError::failed)?;
     let (scene, _) = common.lit_scene(&args.map, &cvars)?;
-    let settings = settings(&cvars);
+    let settings = Settings {
+        clock: Clock::from_seconds(args.time.unwrap_or(0.0)),
+        ..settings(&cvars)
+    };
     let camera = camera(
         &scene,
         args.camera.as_deref(),
@@ -198,6 +203,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
             count,
             path: &|_| camera,
             accumulate: cvars.number("rt_accumulate") != 0.0,
+            frame_time: args.fps.map_or(0.0, |fps| 1.0 / fps),
         };
         let run = run_frames(&prepared, &job, &advance, &note)?;
         (run.film, run.frames)

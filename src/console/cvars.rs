@@ -133,12 +133,18 @@ pub const CVARS: &[Cvar] = &[
         "averages frames in the window while nothing moves, in place of denoising them",
     ),
     int("rt_pause", 0, 0, 1, "stops the scene's clock"),
+    float("timescale", 1.0, 0.0, 100.0, "speed of the scene's clock"),
     float(
         "rt_exposure",
         0.0,
         0.0,
         1e6,
         "linear multiplier on radiance before the tone map; 0 chooses it from the image",
+    ),
+    choice(
+        "rt_emission",
+        &["game", "radiance"],
+        "how bright lamps and skies are to the eye: as the game shows them, or with the radiance they light with",
     ),
     choice(
         "rt_tonemap",

@@ -2,7 +2,8 @@
 
 use super::Cvars;
 use crate::lighting::Lights;
-use crate::render::settings::{AmbientLight, LightSampling, Settings, Tonemap};
+use crate::render::settings::{AmbientLight, LightSampling, Settings, ShownEmission, Tonemap};
+use crate::scene::clock::Clock;
 use crate::scene::sampling::Sequence;
 
 /// Which lights a map gets.
@@ -68,6 +69,13 @@ pub fn settings(cvars: &Cvars) -> Settings {
         taa: on("rt_taa"),
         taa_gamma: number("rt_taaGamma") as f32,
         filter_textures: true,
+        shown_emission: if on("rt_emission") {
+            ShownEmission::Radiance
+        } else {
+            ShownEmission::Game
+        },
+        choose_layers: true,
+        clock: Clock::default(),
     }
 }
 

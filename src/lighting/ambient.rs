@@ -14,8 +14,8 @@ use crate::render::settings::{LightSampling, Settings};
 use crate::scene::Scene;
 use crate::scene::ambient::{Ambient, AmbientVolume};
 use crate::scene::clusters::cluster_at;
-use crate::scene::records::{AmbientCube, NONE};
-use glam::{UVec3, Vec2, Vec3};
+use crate::scene::records::AmbientCube;
+use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 
 /// Distance between grid points where the map says nothing, units.
@@ -107,18 +107,7 @@ pub fn left_over(scene: &Scene, tracer: &Tracer, file: Option<&LightsFile>) -> A
             Some(std::array::from_fn(|axis| {
                 let normal = AXES[axis];
                 let stored = (ambient - directed * share).max(Vec3::ZERO) + directed * normal.dot(direction).max(0.0);
-                let at = SurfaceHit {
-                    position,
-                    geometric_normal: normal,
-                    shading_normal: normal,
-                    uv: Vec2::ZERO,
-                    albedo: Vec3::ONE,
-                    material: NONE,
-                    triangle: NONE,
-                    front: true,
-                    cluster: row,
-                    row,
-                };
+                let at = SurfaceHit::receiver(position, normal, row);
                 let address = SampleAddress {
                     pixel: i as u32,
                     index: axis as u32,

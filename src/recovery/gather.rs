@@ -147,7 +147,7 @@ fn stored(scene: &Scene, hit: &Hit) -> [u8; 3] {
     };
     let (mut s, mut t) = (0.0, 0.0);
     for (v, w) in triangle.vertices.into_iter().zip(weights) {
-        let [x, y] = scene.geometry.lightmap_uvs[v as usize];
+        let [x, y] = scene.geometry.attributes[v as usize].lightmap_uv;
         s += x * w;
         t += y * w;
     }

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use crate::scene::lights::{LightSource, LightTable};
 use crate::scene::records::{LIGHT_TRIANGLE, NONE};
 use crate::scene::sampling::triangle;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -324,16 +324,5 @@ impl<'a> Others<'a> {
 
 /// A luxel in the form that the light samplers take.
 fn receiver(luxel: &Luxel, normal: Vec3) -> SurfaceHit {
-    SurfaceHit {
-        position: luxel.position,
-        geometric_normal: normal,
-        shading_normal: normal,
-        uv: Vec2::ZERO,
-        albedo: Vec3::ONE,
-        material: 0,
-        triangle: NONE,
-        front: true,
-        cluster: luxel.cluster,
-        row: luxel.cluster,
-    }
+    SurfaceHit::receiver(luxel.position, normal, luxel.cluster)
 }

@@ -85,7 +85,7 @@ pub fn all(scene: &Scene, encoding: &Encoding) -> Vec<Luxel> {
         }
         let uvs = triangle
             .vertices
-            .map(|v| Vec2::from(scene.geometry.lightmap_uvs[v as usize]) * LIGHTMAP_SIZE as f32);
+            .map(|v| Vec2::from(scene.geometry.attributes[v as usize].lightmap_uv) * LIGHTMAP_SIZE as f32);
         in_triangle(uvs, |x, y, weights, inverse| {
             let texel = (page * LIGHTMAP_SIZE + y) * LIGHTMAP_SIZE + x;
             if last[texel] == triangle.surface {

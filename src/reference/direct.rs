@@ -161,11 +161,7 @@ impl<'a> Estimator<'a> {
         };
         counts.shadow += 1;
         let origin = offset_point(self.at.position, self.at.geometric_normal);
-        if visible(self.scene, self.tracer, origin, &sample) {
-            sample.value * weight
-        } else {
-            Vec3::ZERO
-        }
+        sample.value * visible(self.scene, self.tracer, origin, &sample) * weight
     }
 
     /// Contribution of one light, times a weight.

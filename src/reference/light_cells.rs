@@ -12,7 +12,7 @@ use crate::scene::light_cells::{LightCells, place};
 use crate::scene::light_power::luminance;
 use crate::scene::records::{CellEntry, LightRun, MATERIAL_SKY, NONE};
 use crate::scene::sampling::{key, pcg, triangle, unit};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -46,18 +46,7 @@ struct Receiver {
 
 impl Receiver {
     fn hit(&self) -> SurfaceHit {
-        SurfaceHit {
-            position: self.position,
-            geometric_normal: self.normal,
-            shading_normal: self.normal,
-            uv: Vec2::ZERO,
-            albedo: Vec3::ZERO,
-            material: NONE,
-            triangle: NONE,
-            front: true,
-            cluster: NONE,
-            row: NONE,
-        }
+        SurfaceHit::receiver(self.position, self.normal, NONE)
     }
 }
 
@@ -221,17 +210,16 @@ impl Filler<'_> {
         let u = [unit(random(1)), unit(random(2))];
         let record = &lights.lights[light as usize];
         match sample_light(self.scene, record, at, u, PointSampling::SolidAngle) {
-            Some(s)
-                if visible(
+            Some(s) => {
+                let share = visible(
                     self.scene,
                     self.tracer,
                     offset_point(at.position, at.geometric_normal),
                     &s,
-                ) =>
-            {
-                luminance(s.value.into()) * weight as f32 / own as f32
+                );
+                luminance((s.value * share).into()) * weight as f32 / own as f32
             }
-            _ => 0.0,
+            None => 0.0,
         }
     }
 

@@ -260,7 +260,14 @@ fn sample_triangle(
 ) -> Option<LightSample> {
     let p = triangle_point(light, at, u, points).filter(|p| p.factor > 0.0)?;
     let uv = uv_at(scene, light.triangle, p.barycentrics);
-    let radiance = emitted(scene, &scene.materials[light.material as usize], uv, p.direction);
+    let radiance = emitted(
+        scene,
+        &scene.materials[light.material as usize],
+        uv,
+        p.position,
+        p.direction,
+        at.clock,
+    );
     Some(LightSample {
         value: radiance * (p.factor * light.scale),
         target: Target::Point(offset_point(p.position, p.normal)),

@@ -4,10 +4,12 @@
 //! done in double precision.
 
 pub mod direct;
+pub mod layers;
 pub mod light_cells;
 pub mod light_choice;
 pub mod light_sample;
 pub mod primary;
+pub mod program;
 pub mod renderer;
 pub mod surface;
 pub mod texture;

@@ -1,8 +1,9 @@
 //! Images by the CPU tracer.
 
 use super::direct::{RayCounts, SampleAddress, direct_light};
+use super::layers::see;
 use super::primary::{CameraRay, View};
-use super::surface::{SurfaceHit, emission_seen, surface_at};
+use super::surface::SurfaceHit;
 use super::trace::Tracer;
 use crate::render::film::{Aovs, Film};
 use crate::render::settings::{AmbientLight, Settings};
@@ -24,6 +25,7 @@ pub struct CpuRenderer<'a> {
 pub struct SampleRadiance {
     pub direct: Vec3,
     pub emission: Vec3,
+    pub transparent: Vec3,
 }
 
 const FAR: f64 = f32::MAX as f64;
@@ -44,16 +46,18 @@ fn ambient_light(scene: &Scene, settings: &Settings, at: &SurfaceHit) -> Vec3 {
 struct Sums {
     direct: [f64; 3],
     emission: [f64; 3],
+    transparent: [f64; 3],
     mean: [f64; 3],
     m2: [f64; 3],
 }
 
 impl Sums {
     fn add(&mut self, sample: SampleRadiance, n: f64) {
-        let total = sample.direct + sample.emission;
+        let total = sample.direct + sample.emission + sample.transparent;
         for c in 0..3 {
             self.direct[c] += f64::from(sample.direct[c]);
             self.emission[c] += f64::from(sample.emission[c]);
+            self.transparent[c] += f64::from(sample.transparent[c]);
             let x = f64::from(total[c]);
             let delta = x - self.mean[c];
             self.mean[c] += delta / n;
@@ -84,6 +88,7 @@ impl<'a> CpuRenderer<'a> {
     /// Radiance along a ray.
     fn radiance(
         &self,
+        tracer: &Tracer,
         settings: &Settings,
         ray: CameraRay,
         cone: f32,
@@ -91,29 +96,23 @@ impl<'a> CpuRenderer<'a> {
         counts: &mut RayCounts,
     ) -> SampleRadiance {
         counts.primary += 1;
-        let Some(hit) = self.tracer.closest(self.scene, ray.origin, ray.direction, FAR) else {
-            return SampleRadiance::default();
+        let seen = see(self.scene, tracer, settings, ray, cone, address);
+        let mut out = SampleRadiance {
+            emission: seen.share * seen.emission,
+            transparent: seen.layers,
+            ..SampleRadiance::default()
         };
-        let surface = surface_at(self.scene, &self.tracer, &hit, ray.direction, cone);
-        if !settings.illumination {
-            let emission = emission_seen(self.scene, &surface, ray.direction);
-            return SampleRadiance {
-                direct: surface.albedo,
-                emission: if surface.albedo == Vec3::ZERO {
-                    emission
-                } else {
-                    Vec3::ZERO
-                },
-            };
-        }
-        let emission = emission_seen(self.scene, &surface, ray.direction);
-        let direct = if surface.albedo == Vec3::ZERO {
-            Vec3::ZERO
+        let Some((surface, _)) = seen.surface.filter(|(s, _)| s.albedo != Vec3::ZERO) else {
+            return out;
+        };
+        if settings.illumination {
+            let lit = direct_light(self.scene, tracer, settings, &surface, address, counts);
+            out.direct = seen.share * (surface.albedo * (lit + ambient_light(self.scene, settings, &surface)));
         } else {
-            let lit = direct_light(self.scene, &self.tracer, settings, &surface, address, counts);
-            surface.albedo * (lit + ambient_light(self.scene, settings, &surface))
-        };
-        SampleRadiance { direct, emission }
+            out.direct = seen.share * surface.albedo;
+            out.emission = Vec3::ZERO;
+        }
+        out
     }
 
     /// Mean of independent samples `range` of every pixel. `progress` is called with the share done, 0..1, from any
@@ -128,6 +127,7 @@ impl<'a> CpuRenderer<'a> {
     ) -> (Film, RayCounts) {
         let (width, height) = size;
         let view = self.view(camera, size, settings);
+        let tracer = self.tracer.at(self.scene, settings.clock);
         let cone = if settings.filter_textures {
             view.pixel_width
         } else {
@@ -145,7 +145,7 @@ impl<'a> CpuRenderer<'a> {
                         let pixel = x + (y << 16);
                         let address = SampleAddress { pixel, index };
                         let ray = view.sample(settings, x, y, address);
-                        let sample = self.radiance(settings, ray, cone, address, &mut counts);
+                        let sample = self.radiance(&tracer, settings, ray, cone, address, &mut counts);
                         sums.add(sample, f64::from(index - range.start) + 1.0);
                     }
                 }
@@ -162,6 +162,7 @@ impl<'a> CpuRenderer<'a> {
             film.mean[i] = sums.mean.map(|m| m as f32);
             film.direct[i] = mean(sums.direct);
             film.emission[i] = mean(sums.emission);
+            film.transparent[i] = mean(sums.transparent);
             film.samples[i] = n as f32;
             if n > 1.0 {
                 film.variance[i] = (sums.m2.iter().sum::<f64>() / 3.0 / (n * (n - 1.0))) as f32;
@@ -176,6 +177,11 @@ impl<'a> CpuRenderer<'a> {
     /// Geometry through pixel centres.
     pub fn aovs(&self, camera: &Camera, size: (u32, u32), settings: &Settings) -> Aovs {
         let view = View::new(camera, size, 1.0);
+        let tracer = self.tracer.at(self.scene, settings.clock);
+        let settings = &Settings {
+            choose_layers: false,
+            ..*settings
+        };
         let cone = if settings.filter_textures {
             view.pixel_width
         } else {
@@ -185,9 +191,9 @@ impl<'a> CpuRenderer<'a> {
             .into_par_iter()
             .map(|i| {
                 let ray = view.through((i % size.0) as f32 + 0.5, (i / size.0) as f32 + 0.5);
-                let hit = self.tracer.closest(self.scene, ray.origin, ray.direction, FAR)?;
-                let surface = surface_at(self.scene, &self.tracer, &hit, ray.direction, cone);
-                Some((surface, hit.t as f32))
+                let address = SampleAddress { pixel: i, index: 0 };
+                let seen = see(self.scene, &tracer, settings, ray, cone, address);
+                seen.surface.map(|(surface, hit)| (surface, hit.t as f32))
             })
             .collect();
         let mut aovs = Aovs {

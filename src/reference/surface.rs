@@ -1,13 +1,21 @@
 //! What shading knows of a hit. Counterpart of `shaders/include/surface.glsl`.
 
+use super::program::{Point, cloud_coordinates, shade, shining};
 use super::texture::{sample, uv_at};
 use super::trace::{Hit, Tracer, point_to_world};
+use crate::render::settings::ShownEmission;
 use crate::scene::Scene;
+use crate::scene::clock::Clock;
 use crate::scene::clusters::{NUDGES, cluster_at};
+use crate::scene::program::{Shade, UNLIT};
 use crate::scene::records::{
-    Instance, MATERIAL_CLAMP, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
+    Instance, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_LAYER, MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_SKY,
+    MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
 };
-use glam::{Vec2, Vec3, Vec4Swizzles};
+use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
+
+/// How far away clouds are where stages ask for a place, units.
+const CLOUD_DISTANCE: f32 = 4096.0;
 
 /// A point to be shaded, wherever the ray that found it came from.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +28,10 @@ pub struct SurfaceHit {
     pub uv: Vec2,
     /// Linear reflectance.
     pub albedo: Vec3,
+    /// Radiance of stages that shine by themselves, luxel units.
+    pub glow: Vec3,
+    /// Share of what is behind that shows through.
+    pub through: Vec3,
     pub material: u32,
     pub triangle: u32,
     /// The ray met the side that the surface's normals point to.
@@ -28,6 +40,28 @@ pub struct SurfaceHit {
     pub cluster: u32,
     /// Row of the light lists.
     pub row: u32,
+    pub clock: Clock,
+}
+
+impl SurfaceHit {
+    /// A point that receives light, for samplers that look at nothing else.
+    pub fn receiver(position: Vec3, normal: Vec3, row: u32) -> Self {
+        Self {
+            position,
+            geometric_normal: normal,
+            shading_normal: normal,
+            uv: Vec2::ZERO,
+            albedo: Vec3::ONE,
+            glow: Vec3::ZERO,
+            through: Vec3::ZERO,
+            material: NONE,
+            triangle: NONE,
+            front: true,
+            cluster: row,
+            row,
+            clock: Clock::default(),
+        }
+    }
 }
 
 fn normal_to_world(instance: &Instance, n: Vec3) -> Vec3 {
@@ -57,7 +91,8 @@ pub fn classify(scene: &Scene, position: Vec3, normal: Vec3, fallback_row: u32) 
     (NONE, fallback_row)
 }
 
-/// Level of detail whose texel is as wide as the ray's footprint. `width`: of the ray's cone at the hit, units.
+/// Level of detail whose texel is as wide as the ray's footprint, for an image of `size` texels along its edges. `width`: of
+/// the ray's cone at the hit, units.
 fn texture_lod(corners: [Vec3; 3], uvs: [Vec2; 3], size: Vec2, width: f32, cosine: f32) -> f32 {
     let world_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
     let (e1, e2) = ((uvs[1] - uvs[0]) * size, (uvs[2] - uvs[0]) * size);
@@ -66,8 +101,15 @@ fn texture_lod(corners: [Vec3; 3], uvs: [Vec2; 3], size: Vec2, width: f32, cosin
     0.5 * ratio.max(f32::MIN_POSITIVE).log2() + (width / cosine.abs().max(1e-3)).max(f32::MIN_POSITIVE).log2()
 }
 
-/// Evaluates the surface at a hit. `cone`: width of the ray's cone at distance 1, 0 for full-resolution textures.
-pub fn surface_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, cone: f32) -> SurfaceHit {
+/// A hit as far as geometry goes.
+struct Place {
+    position: Vec3,
+    geometric: Vec3,
+    shading: Vec3,
+    front: bool,
+}
+
+fn place(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3) -> Place {
     let instance = &tracer.instances[hit.instance as usize];
     let triangle = scene.geometry.triangles[hit.triangle as usize];
     let corners = scene.geometry.corners(hit.triangle);
@@ -89,42 +131,136 @@ pub fn surface_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, co
         geometric = -geometric;
         shading = -shading;
     }
+    Place {
+        position,
+        geometric,
+        shading,
+        front,
+    }
+}
+
+fn colour(code: u32) -> Vec4 {
+    Vec4::from_array(code.to_le_bytes().map(|c| f32::from(c) / 255.0))
+}
+
+fn stage_point(scene: &Scene, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Point {
+    let triangle = scene.geometry.triangles[hit.triangle as usize];
+    let attributes = triangle.vertices.map(|v| scene.geometry.attributes[v as usize]);
+    let [b1, b2] = hit.barycentrics.map(|b| b as f32);
+    let b0 = 1.0 - b1 - b2;
+    let uvs = attributes.map(|a| Vec2::from(a.uv));
+    let page = attributes.map(|a| Vec2::from(a.lightmap_uv));
+    let colours = attributes.map(|a| colour(a.color));
+    let length = direction.length();
+    let distance = hit.t as f32 * length;
+    let lod = if cone > 0.0 {
+        let cosine = place.geometric.dot(direction) / length;
+        texture_lod(
+            scene.geometry.corners(hit.triangle),
+            uvs,
+            Vec2::ONE,
+            cone * distance,
+            cosine,
+        )
+    } else {
+        f32::NEG_INFINITY
+    };
+    Point {
+        uv: uv_at(scene, hit.triangle, [b1, b2]),
+        lightmap_uv: page[0] * b0 + page[1] * b1 + page[2] * b2,
+        colour: colours[0] * b0 + colours[1] * b1 + colours[2] * b2,
+        position: place.position,
+        normal: place.shading,
+        to_viewer: -direction / length,
+        distance,
+        lod,
+    }
+}
+
+/// What stages look at in a hit, textures at full resolution.
+pub fn point_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3) -> Point {
+    stage_point(scene, &place(scene, tracer, hit, direction), hit, direction, 0.0)
+}
+
+fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Shade {
+    let triangle = scene.geometry.triangles[hit.triangle as usize];
     let material = &scene.materials[triangle.material as usize];
+    if material.flags & MATERIAL_SKY != 0 {
+        return Shade {
+            albedo: Vec3::ZERO,
+            glow: Vec3::ZERO,
+            through: Vec3::ZERO,
+        };
+    }
+    if material.flags & MATERIAL_STAGES != 0 {
+        let point = stage_point(scene, place, hit, direction, cone);
+        return shade(scene, material, &point, tracer.clock);
+    }
     let texture = &scene.textures[material.texture as usize];
-    let uv = uv_at(scene, hit.triangle, [b1, b2]);
     let lod = if cone > 0.0 {
         let uvs = triangle
             .vertices
             .map(|v| Vec2::from(scene.geometry.attributes[v as usize].uv));
-        let width = cone * hit.t as f32 * direction.length();
-        let cosine = geometric.dot(direction) / direction.length();
+        let length = direction.length();
         texture_lod(
-            corners,
+            scene.geometry.corners(hit.triangle),
             uvs,
             Vec2::new(texture.width as f32, texture.height as f32),
-            width,
-            cosine,
+            cone * hit.t as f32 * length,
+            place.geometric.dot(direction) / length,
         )
     } else {
         0.0
     };
-    let albedo = if material.flags & MATERIAL_SKY != 0 {
-        Vec3::ZERO
-    } else {
-        sample(texture, uv, lod, material.flags & MATERIAL_CLAMP != 0).xyz()
-    };
-    let (cluster, row) = classify(scene, position, geometric, triangle.fallback_row);
+    let uv = uv_at(scene, hit.triangle, hit.barycentrics.map(|b| b as f32));
+    Shade {
+        albedo: sample(texture, uv, lod, material.flags & MATERIAL_CLAMP != 0).xyz(),
+        glow: Vec3::ZERO,
+        through: Vec3::ZERO,
+    }
+}
+
+/// What a surface does with light at a hit. `cone` as for [`surface_at`].
+pub fn shade_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, cone: f32) -> Shade {
+    shade_of(
+        scene,
+        tracer,
+        &place(scene, tracer, hit, direction),
+        hit,
+        direction,
+        cone,
+    )
+}
+
+/// Evaluates the surface at a hit. `cone`: width of the ray's cone at distance 1, 0 for full-resolution textures.
+pub fn surface_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, cone: f32) -> SurfaceHit {
+    let place = place(scene, tracer, hit, direction);
+    let triangle = scene.geometry.triangles[hit.triangle as usize];
+    let shade = shade_of(scene, tracer, &place, hit, direction, cone);
+    let (cluster, row) = classify(scene, place.position, place.geometric, triangle.fallback_row);
     SurfaceHit {
-        position,
-        geometric_normal: geometric,
-        shading_normal: shading,
-        uv,
-        albedo,
+        position: place.position,
+        geometric_normal: place.geometric,
+        shading_normal: place.shading,
+        uv: uv_at(scene, hit.triangle, hit.barycentrics.map(|b| b as f32)),
+        albedo: shade.albedo,
+        glow: shade.glow,
+        through: shade.through,
         material: triangle.material,
         triangle: hit.triangle,
-        front,
+        front: place.front,
         cluster,
         row,
+        clock: tracer.clock,
+    }
+}
+
+/// Whether a surface is drawn on the side that a ray meets.
+pub fn drawn(material: &Material, front: bool) -> bool {
+    if front {
+        material.flags & MATERIAL_NO_FRONT == 0
+    } else {
+        material.flags & MATERIAL_BACK != 0
     }
 }
 
@@ -153,36 +289,100 @@ fn sky_box_lookup(d: Vec3) -> (usize, Vec2) {
     (side, Vec2::new(s, t) / m * 0.5 + 0.5)
 }
 
-/// Radiance of a sky material in a direction.
-pub fn sky_radiance(scene: &Scene, material: &Material, direction: Vec3) -> Vec3 {
-    let scale = Vec3::from(material.emission);
-    if material.flags & MATERIAL_SKY_BOX == 0 {
-        return scale;
-    }
+fn sky_box(scene: &Scene, material: &Material, direction: Vec3) -> Vec3 {
     let (side, uv) = sky_box_lookup(direction);
-    scale * sample(&scene.textures[material.sky[side] as usize], uv, 0.0, true).xyz()
+    sample(&scene.textures[material.sky[side] as usize], uv, 0.0, true).xyz()
 }
 
-/// Radiance that a surface emits at texture coordinates towards `-direction`, from the side that emits.
-pub fn emitted(scene: &Scene, material: &Material, uv: Vec2, direction: Vec3) -> Vec3 {
+/// Radiance of a sky material in a direction, as it lights: clouds stand for their mean.
+fn sky_radiance(scene: &Scene, material: &Material, direction: Vec3) -> Vec3 {
+    let scale = Vec3::from(material.emission);
+    if material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES) == MATERIAL_SKY_BOX {
+        scale * sky_box(scene, material, direction)
+    } else {
+        scale
+    }
+}
+
+/// Radiance of a sky material in a direction, as it is seen.
+fn sky_seen(scene: &Scene, material: &Material, direction: Vec3, clock: Clock, shown: ShownEmission) -> Vec3 {
+    if material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES) == 0 {
+        return match shown {
+            ShownEmission::Game => material.shown,
+            ShownEmission::Radiance => material.emission,
+        }
+        .into();
+    }
+    let mut picture = if material.flags & MATERIAL_SKY_BOX != 0 {
+        sky_box(scene, material, direction)
+    } else {
+        Vec3::ZERO
+    };
+    if material.flags & MATERIAL_STAGES != 0 {
+        let d = direction.normalize();
+        // The cloud layer is a dome; below the horizon there is none.
+        let uv = cloud_coordinates(Vec3::new(d.x, d.y, d.z.max(0.0)), material.cloud_height);
+        let point = Point {
+            distance: CLOUD_DISTANCE,
+            ..Point::on_texture(uv, d * CLOUD_DISTANCE, -d)
+        };
+        let clouds = shade(scene, material, &point, clock);
+        picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
+    }
+    let scale = match shown {
+        ShownEmission::Game => material.shown,
+        ShownEmission::Radiance => material.sky_scale,
+    };
+    picture * Vec3::from(scale)
+}
+
+/// What a surface emits over its factor at a point of its texture. `position`: world.
+fn emission_picture(
+    scene: &Scene,
+    material: &Material,
+    uv: Vec2,
+    position: Vec3,
+    direction: Vec3,
+    clock: Clock,
+) -> Vec3 {
+    if material.flags & MATERIAL_MOVING_EMISSION != 0 {
+        let point = Point::on_texture(uv, position, -direction);
+        return shining(scene, material, &point, clock);
+    }
+    if material.emission_texture == NONE {
+        return Vec3::ONE;
+    }
+    let texture = &scene.textures[material.emission_texture as usize];
+    sample(texture, uv, 0.0, material.flags & MATERIAL_CLAMP != 0).xyz()
+}
+
+/// Radiance that a surface emits at a point of its texture towards `-direction`, from the side that emits: what lights are
+/// sampled with. `position`: world.
+pub fn emitted(scene: &Scene, material: &Material, uv: Vec2, position: Vec3, direction: Vec3, clock: Clock) -> Vec3 {
     if material.flags & MATERIAL_SKY != 0 {
         return sky_radiance(scene, material, direction);
     }
     let factor = Vec3::from(material.emission);
-    if material.emission_texture == NONE || factor == Vec3::ZERO {
+    if factor == Vec3::ZERO {
         return factor;
     }
-    let texture = &scene.textures[material.emission_texture as usize];
-    factor * sample(texture, uv, 0.0, material.flags & MATERIAL_CLAMP != 0).xyz()
+    factor * emission_picture(scene, material, uv, position, direction, clock)
 }
 
-/// Radiance that a ray along `direction` receives from a surface it hits.
-pub fn emission_seen(scene: &Scene, surface: &SurfaceHit, direction: Vec3) -> Vec3 {
+/// Radiance that a ray along `direction` receives from a surface it hits, but for the light that the surface reflects.
+pub fn emission_seen(scene: &Scene, surface: &SurfaceHit, direction: Vec3, shown: ShownEmission) -> Vec3 {
     let material = &scene.materials[surface.material as usize];
-    let both = MATERIAL_SKY | MATERIAL_TWO_SIDED_EMISSION;
-    if surface.front || material.flags & both != 0 {
-        emitted(scene, material, surface.uv, direction)
-    } else {
-        Vec3::ZERO
+    let clock = surface.clock;
+    if material.flags & MATERIAL_SKY != 0 {
+        return sky_seen(scene, material, direction, clock, shown);
     }
+    let emits = surface.front || material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER) != 0;
+    let factor = Vec3::from(match shown {
+        ShownEmission::Game => material.shown,
+        ShownEmission::Radiance => material.emission,
+    });
+    if !emits || factor == Vec3::ZERO {
+        return surface.glow;
+    }
+    surface.glow + factor * emission_picture(scene, material, surface.uv, surface.position, direction, clock)
 }

@@ -5,7 +5,6 @@
 
 use crate::assets::image::{SRGB_TO_LINEAR, Texture};
 use crate::scene::Scene;
-use crate::scene::records::{MATERIAL_CLAMP, Material};
 use glam::{Vec2, Vec4};
 
 /// Interpolated texture coordinates of a triangle.
@@ -16,7 +15,14 @@ pub fn uv_at(scene: &Scene, triangle: u32, [b1, b2]: [f32; 2]) -> Vec2 {
     a * (1.0 - b1 - b2) + b * b1 + c * b2
 }
 
-fn texel(texture: &Texture, level: usize, x: i32, y: i32, clamp: bool) -> Vec4 {
+/// What lookups give.
+#[derive(Clone, Copy, PartialEq)]
+enum Form {
+    Linear,
+    Encoded,
+}
+
+fn texel(texture: &Texture, level: usize, x: i32, y: i32, clamp: bool, form: Form) -> Vec4 {
     let (w, h) = texture.level_size(level);
     let (w, h) = (w as i32, h as i32);
     let (x, y) = if clamp {
@@ -26,15 +32,14 @@ fn texel(texture: &Texture, level: usize, x: i32, y: i32, clamp: bool) -> Vec4 {
     };
     let p = texture.levels[level][(y * w + x) as usize];
     let table = &*SRGB_TO_LINEAR;
-    Vec4::new(
-        table[usize::from(p[0])],
-        table[usize::from(p[1])],
-        table[usize::from(p[2])],
-        f32::from(p[3]) / 255.0,
-    )
+    let colour = |c: u8| match form {
+        Form::Linear => table[usize::from(c)],
+        Form::Encoded => f32::from(c) / 255.0,
+    };
+    Vec4::new(colour(p[0]), colour(p[1]), colour(p[2]), f32::from(p[3]) / 255.0)
 }
 
-fn bilinear(texture: &Texture, level: usize, uv: Vec2, clamp: bool) -> Vec4 {
+fn bilinear(texture: &Texture, level: usize, uv: Vec2, clamp: bool, form: Form) -> Vec4 {
     let (w, h) = texture.level_size(level);
     // Whole periods are dropped first, so that far coordinates keep their fraction.
     let uv = if clamp {
@@ -46,31 +51,33 @@ fn bilinear(texture: &Texture, level: usize, uv: Vec2, clamp: bool) -> Vec4 {
     let base = p.floor();
     let f = p - base;
     let (x, y) = (base.x as i32, base.y as i32);
-    let at = |dx, dy| texel(texture, level, x + dx, y + dy, clamp);
+    let at = |dx, dy| texel(texture, level, x + dx, y + dy, clamp, form);
     let top = at(0, 0) + (at(1, 0) - at(0, 0)) * f.x;
     let bottom = at(0, 1) + (at(1, 1) - at(0, 1)) * f.x;
     top + (bottom - top) * f.y
 }
 
-/// Linear RGB and alpha at texture coordinates; `lod` 0 is the full image.
-pub fn sample(texture: &Texture, uv: Vec2, lod: f32, clamp: bool) -> Vec4 {
+fn trilinear(texture: &Texture, uv: Vec2, lod: f32, clamp: bool, form: Form) -> Vec4 {
     if !uv.is_finite() {
         return Vec4::ZERO;
     }
     let lod = lod.clamp(0.0, (texture.levels.len() - 1) as f32);
     let base = lod.floor();
-    let near = bilinear(texture, base as usize, uv, clamp);
+    let near = bilinear(texture, base as usize, uv, clamp, form);
     let f = lod - base;
     if f == 0.0 {
         return near;
     }
-    let far = bilinear(texture, base as usize + 1, uv, clamp);
+    let far = bilinear(texture, base as usize + 1, uv, clamp, form);
     near + (far - near) * f
 }
 
-/// Alpha of a triangle's base texture, full resolution.
-pub fn alpha_at(scene: &Scene, triangle: u32, material: &Material, barycentrics: [f32; 2]) -> f32 {
-    let uv = uv_at(scene, triangle, barycentrics);
-    let texture = &scene.textures[material.texture as usize];
-    sample(texture, uv, 0.0, material.flags & MATERIAL_CLAMP != 0).w
+/// Linear RGB and alpha at texture coordinates; `lod` 0 is the full image.
+pub fn sample(texture: &Texture, uv: Vec2, lod: f32, clamp: bool) -> Vec4 {
+    trilinear(texture, uv, lod, clamp, Form::Linear)
+}
+
+/// The same with RGB as encoded, filtered as such: what stages blend.
+pub fn sample_encoded(texture: &Texture, uv: Vec2, lod: f32, clamp: bool) -> Vec4 {
+    trilinear(texture, uv, lod, clamp, Form::Encoded)
 }

@@ -1,12 +1,17 @@
 //! Ray queries against the scene on the CPU. Counterpart of `shaders/include/trace.glsl`.
 
-use super::texture::alpha_at;
+use super::program::tested_alpha;
+use super::surface::point_at;
 use crate::scene::Scene;
 use crate::scene::bvh::build_cwbvhs;
-use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED, MATERIAL_SKY};
+use crate::scene::clock::Clock;
+use crate::scene::entity_geometry::Placement;
+use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material};
 use glam::{DVec3, Vec3};
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
+use std::cell::Cell;
+use std::sync::Arc;
 
 /// The nearest intersection along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,10 +25,42 @@ pub struct Hit {
     pub barycentrics: [f64; 2],
 }
 
-/// Trees and placed meshes.
+impl Hit {
+    /// Order along a ray: by distance, and among coincident triangles by number.
+    fn before(&self, t: f64, triangle: u32) -> bool {
+        self.t < t || (self.t == t && self.triangle < triangle)
+    }
+}
+
+/// Trees and placed meshes at a moment.
 pub struct Tracer {
-    trees: Vec<CwBvh>,
+    trees: Arc<Vec<CwBvh>>,
     pub instances: Vec<Instance>,
+    pub clock: Clock,
+}
+
+/// What a ray looks for.
+enum Wanted<'a> {
+    /// The nearest that is no layer.
+    Solid(&'a Cell<bool>),
+    /// Any that is no layer.
+    Blocker(&'a Cell<bool>),
+    /// The nearest of all, layers too, that comes after a hit.
+    Next(Option<Hit>),
+}
+
+fn instances(scene: &Scene, clock: Clock) -> Vec<Instance> {
+    let record = |p: &Placement| p.record(&scene.geometry.meshes, clock, clock);
+    scene.placements.iter().map(record).collect()
+}
+
+/// What is between two points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Between {
+    Blocked,
+    /// Nothing but layers that take something from light.
+    Filtered,
+    Free,
 }
 
 /// Möller–Trumbore in double precision; both sides count. Returns t and the weights of the second and third vertex.
@@ -65,13 +102,23 @@ impl Tracer {
     /// Builds the trees of a scene.
     pub fn new(scene: &Scene) -> Self {
         Self {
-            trees: build_cwbvhs(&scene.geometry),
-            instances: scene.placements.iter().map(|p| p.record(&scene.geometry)).collect(),
+            trees: Arc::new(build_cwbvhs(&scene.geometry)),
+            instances: instances(scene, Clock::default()),
+            clock: Clock::default(),
         }
     }
 
-    /// Visits accepted hits with 0 < t < `t_max`, nearer ones each time, until `stop` says so.
-    fn visit(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64, stop_at_first: bool) -> Option<Hit> {
+    /// The same scene at another moment.
+    pub fn at(&self, scene: &Scene, clock: Clock) -> Self {
+        Self {
+            trees: self.trees.clone(),
+            instances: instances(scene, clock),
+            clock,
+        }
+    }
+
+    /// Looks for hits with 0 < t < `t_max`.
+    fn visit(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64, wanted: &Wanted<'_>) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut limit = t_max;
         for (index, instance) in self.instances.iter().enumerate() {
@@ -93,69 +140,109 @@ impl Tracer {
             let ray = Ray::new(o.into(), d.into(), 0.0, next_up(limit));
             let mut state = tree.new_ray_traversal(ray);
             let mut node_hit = RayHit::none();
-            let mut candidate = None;
             while tree.ray_traverse_dynamic(&mut state, &mut node_hit, |_, primitive| {
                 let triangle = mesh.first_triangle + tree.primitive_indices[primitive];
-                let corners = scene.geometry.corners(triangle);
-                match intersect(od, dd, corners) {
-                    Some((t, barycentrics)) if t < limit && passes(scene, triangle, barycentrics) => {
-                        limit = t;
-                        candidate = Some((t, triangle, barycentrics));
-                        next_up(t)
-                    }
-                    _ => f32::INFINITY,
-                }
-            }) {
-                if stop_at_first {
-                    break;
-                }
-            }
-            if let Some((t, triangle, barycentrics)) = candidate {
-                best = Some(Hit {
+                let Some((t, barycentrics)) = intersect(od, dd, scene.geometry.corners(triangle)) else {
+                    return f32::INFINITY;
+                };
+                let nearer = t < limit || best.is_some_and(|b| t == limit && triangle < b.triangle);
+                let hit = Hit {
                     t,
                     triangle,
                     instance: index as u32,
                     barycentrics,
-                });
-                if stop_at_first {
-                    return best;
+                };
+                if !nearer || !self.accepts(scene, &hit, direction, wanted) {
+                    return f32::INFINITY;
                 }
+                limit = t;
+                best = Some(hit);
+                next_up(t)
+            }) {
+                if matches!(wanted, Wanted::Blocker(_)) {
+                    break;
+                }
+            }
+            if best.is_some() && matches!(wanted, Wanted::Blocker(_)) {
+                return best;
             }
         }
         best
     }
 
-    /// The nearest hit with 0 < t < `t_max`.
-    pub fn closest(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64) -> Option<Hit> {
-        self.visit(scene, origin, direction, t_max, false)
+    /// Whether a candidate is what a ray looks for.
+    fn accepts(&self, scene: &Scene, hit: &Hit, direction: Vec3, wanted: &Wanted<'_>) -> bool {
+        let material = &scene.materials[scene.geometry.triangles[hit.triangle as usize].material as usize];
+        if material.flags & (MATERIAL_ALPHA_TESTED | MATERIAL_LAYER) == 0 {
+            return match wanted {
+                Wanted::Next(Some(after)) => after.before(hit.t, hit.triangle),
+                _ => true,
+            };
+        }
+        match wanted {
+            Wanted::Next(after) => {
+                after.is_none_or(|a| a.before(hit.t, hit.triangle)) && self.passes(scene, material, hit, direction)
+            }
+            Wanted::Solid(filtered) | Wanted::Blocker(filtered) => {
+                if material.flags & MATERIAL_LAYER != 0 {
+                    filtered.set(filtered.get() || material.flags & MATERIAL_FILTER != 0);
+                    return false;
+                }
+                self.passes(scene, material, hit, direction)
+            }
+        }
     }
 
-    /// Whether anything lies between: any hit with 0 < t < `t_max`.
+    /// Alpha test of a candidate.
+    fn passes(&self, scene: &Scene, material: &Material, hit: &Hit, direction: Vec3) -> bool {
+        if material.flags & MATERIAL_ALPHA_TESTED == 0 {
+            return true;
+        }
+        let point = point_at(scene, self, hit, direction);
+        tested_alpha(scene, material, &point, self.clock) * material.alpha_scale + material.alpha_offset > 0.0
+    }
+
+    /// The nearest hit with 0 < t < `t_max` that is no layer.
+    pub fn closest(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64) -> Option<Hit> {
+        self.visit(scene, origin, direction, t_max, &Wanted::Solid(&Cell::new(false)))
+    }
+
+    /// The nearest hit after another one, layers included.
+    pub fn next(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64, after: Option<Hit>) -> Option<Hit> {
+        self.visit(scene, origin, direction, t_max, &Wanted::Next(after))
+    }
+
+    /// What lies at 0 < t < `t_max`.
+    pub fn between(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64) -> Between {
+        let filtered = Cell::new(false);
+        match self.visit(scene, origin, direction, t_max, &Wanted::Blocker(&filtered)) {
+            Some(_) => Between::Blocked,
+            None if filtered.get() => Between::Filtered,
+            None => Between::Free,
+        }
+    }
+
+    /// Whether anything but layers lies between: any hit with 0 < t < `t_max`.
     pub fn occluded(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64) -> bool {
-        self.visit(scene, origin, direction, t_max, true).is_some()
+        self.between(scene, origin, direction, t_max) == Between::Blocked
+    }
+
+    /// Distance to the sky surface through which a ray to infinity leaves, and whether layers may lie before it.
+    pub fn sky(&self, scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(f64, bool)> {
+        let filtered = Cell::new(false);
+        let wanted = Wanted::Solid(&filtered);
+        let hit = self.visit(scene, origin, direction, f64::from(f32::MAX), &wanted)?;
+        let material = scene.geometry.triangles[hit.triangle as usize].material;
+        (scene.materials[material as usize].flags & MATERIAL_SKY != 0).then_some((hit.t, filtered.get()))
     }
 
     /// Whether a ray to infinity leaves through a sky surface.
     pub fn sees_sky(&self, scene: &Scene, origin: Vec3, direction: Vec3) -> bool {
-        self.closest(scene, origin, direction, f64::from(f32::MAX))
-            .is_some_and(|hit| {
-                let material = scene.geometry.triangles[hit.triangle as usize].material;
-                scene.materials[material as usize].flags & MATERIAL_SKY != 0
-            })
+        self.sky(scene, origin, direction).is_some()
     }
 }
 
 /// The next larger single-precision number, so that limits never cut off what lies exactly at them.
 fn next_up(t: f64) -> f32 {
     (t as f32).next_up()
-}
-
-/// Alpha test of a candidate.
-fn passes(scene: &Scene, triangle: u32, barycentrics: [f64; 2]) -> bool {
-    let material = &scene.materials[scene.geometry.triangles[triangle as usize].material as usize];
-    if material.flags & MATERIAL_ALPHA_TESTED == 0 {
-        return true;
-    }
-    let alpha = alpha_at(scene, triangle, material, barycentrics.map(|b| b as f32));
-    alpha * material.alpha_scale + material.alpha_offset > 0.0
 }

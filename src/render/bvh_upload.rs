@@ -1,7 +1,7 @@
 //! Trees in the shaders' layouts: see `shaders/include/trace_cwbvh.glsl` and `trace_bvh2.glsl`.
 
 use crate::scene::bvh::{BvhQuality, mesh_triangles};
-use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED};
+use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED, MATERIAL_LAYER};
 use crate::scene::static_geometry::{Geometry, Mesh};
 use crate::scene::{Scene, bvh};
 use bytemuck::{Pod, Zeroable};
@@ -23,7 +23,7 @@ const BVH2_LEAF: u32 = 1 << 31;
 const BVH2_MOST_TRIANGLES: usize = 1 << 27;
 /// Most triangles in a leaf of the binary tree.
 const BVH2_LEAF_SIZE: u32 = 8;
-const ALPHA_TESTED_BIT: u32 = 1 << 31;
+const NOT_OPAQUE_BIT: u32 = 1 << 31;
 
 /// A tree that the shaders' fixed stacks or references cannot hold.
 #[derive(Debug, Error, PartialEq)]
@@ -214,8 +214,8 @@ impl MeshTrees {
 fn packed_triangle(scene: &Scene, triangle: u32) -> [f32; 12] {
     let [a, b, c] = scene.geometry.corners(triangle);
     let material = &scene.materials[scene.geometry.triangles[triangle as usize].material as usize];
-    let tested = material.flags & MATERIAL_ALPHA_TESTED != 0;
-    let id = triangle | if tested { ALPHA_TESTED_BIT } else { 0 };
+    let tested = material.flags & (MATERIAL_ALPHA_TESTED | MATERIAL_LAYER) != 0;
+    let id = triangle | if tested { NOT_OPAQUE_BIT } else { 0 };
     let (e1, e2) = (b - a, c - a);
     [
         a.x,
@@ -246,20 +246,16 @@ pub struct InstanceTree {
 ///
 /// # Errors
 /// [`TreeError::Depth`] where the tree is deeper than the shaders' stack.
-pub fn instance_tree(
-    geometry: &Geometry,
-    instances: &[Instance],
-    map: &str,
-) -> Result<Option<InstanceTree>, TreeError> {
+pub fn instance_tree(meshes: &[Mesh], instances: &[Instance], map: &str) -> Result<Option<InstanceTree>, TreeError> {
     // Models without triangles (triggers, often by the hundred) would make a long chain of equal boxes.
     let drawn: Vec<usize> = (1..instances.len())
-        .filter(|&i| geometry.meshes[instances[i].mesh as usize].triangle_count > 0)
+        .filter(|&i| meshes[instances[i].mesh as usize].triangle_count > 0)
         .collect();
     let boxes: Vec<Aabb> = drawn
         .iter()
         .map(|&i| {
             let i = &instances[i];
-            let mesh = &geometry.meshes[i.mesh as usize];
+            let mesh = &meshes[i.mesh as usize];
             let mut b = Aabb::empty();
             for corner in 0..8 {
                 let pick = |axis: usize| {

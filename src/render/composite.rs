@@ -29,13 +29,21 @@ impl Composite {
             g.surface(),
             g.direct(),
             g.emission(),
+            g.share(),
+            g.layers(),
             g.filter_a(),
             g.filter_b(),
         ] {
             uses.push(Use::image(image, Access::ComputeRead));
         }
         uses.push(Use::image(g.composite(), Access::ComputeWrite));
-        for image in [g.mean(), g.compensation(), g.mean_direct(), g.mean_emission()] {
+        for image in [
+            g.mean(),
+            g.compensation(),
+            g.mean_direct(),
+            g.mean_emission(),
+            g.mean_layers(),
+        ] {
             uses.push(Use::image(image, Access::ComputeReadWrite));
         }
         self.0.record_image(r, &uses)

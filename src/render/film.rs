@@ -18,6 +18,8 @@ pub struct Film {
     pub direct: Vec<[f32; 3]>,
     /// Share of `mean` that the surface or sky seen emits.
     pub emission: Vec<[f32; 3]>,
+    /// Share of `mean` that layers in front of it add.
+    pub transparent: Vec<[f32; 3]>,
 }
 
 /// Why images cannot be joined.
@@ -39,6 +41,7 @@ impl Film {
             variance: vec![0.0; n],
             direct: vec![[0.0; 3]; n],
             emission: vec![[0.0; 3]; n],
+            transparent: vec![[0.0; 3]; n],
         }
     }
 
@@ -70,6 +73,7 @@ impl Film {
             join(&mut self.mean[i], other.mean[i]);
             join(&mut self.direct[i], other.direct[i]);
             join(&mut self.emission[i], other.emission[i]);
+            join(&mut self.transparent[i], other.transparent[i]);
             self.variance[i] = if n > 1.0 { (total / (n * (n - 1.0))) as f32 } else { 0.0 };
             self.samples[i] = n as f32;
         }

@@ -9,6 +9,7 @@ use super::frame_constants::{FrameConstants, Push};
 use super::gbuffer::GBuffer;
 use super::gradient::Gradient;
 use super::gradient_atrous::GradientAtrous;
+use super::moving::Moving;
 use super::pass::{PassContext, Recorder};
 use super::primary::Primary;
 use super::resample::Resample;
@@ -123,7 +124,16 @@ impl FrameRenderer {
         view.gbuffer.parity ^= 1;
         view.anti_aliased = input.anti_aliases();
         let constants = frame_constants(scene, view, slot, input)?;
-        let mut constants = view.history.advance(constants, input, scene.revision());
+        let mut constants = view.history.advance(constants, input, scene.revision(), scene.moving);
+        if scene.moving.geometry {
+            let moving = match view.moving.take() {
+                Some(made) => made,
+                None => Moving::new(scene, view.constants.len())?,
+            };
+            let moving = view.moving.insert(moving);
+            let clock = input.settings.clock;
+            constants = moving.advance(cmd, &mut view.tracker, scene, slot, clock, constants)?;
+        }
         let reuses = input.reuses();
         if reuses {
             constants = view.reservoirs(&scene.device)?.complete(constants, &input.settings);
@@ -136,6 +146,7 @@ impl FrameRenderer {
             tracker: &mut view.tracker,
             timestamps,
             scene,
+            scene_sets: view.moving.as_ref().and_then(Moving::sets).unwrap_or(&scene.sets),
             gbuffer: &view.gbuffer,
             push: Push {
                 frame: view.constants[slot].address(),
@@ -226,6 +237,9 @@ fn frame_constants(
         taa_gamma: s.taa_gamma,
         fireflies: s.fireflies,
         exposure_blend: input.exposure_blend,
+        clock: s.clock.0,
+        shown_emission: s.shown_emission as u32,
+        choose_layers: u32::from(s.choose_layers),
         ..base
     })
 }

@@ -11,6 +11,8 @@ pub struct FrameConstants {
     pub attributes: u64,
     pub triangles: u64,
     pub materials: u64,
+    pub stages: u64,
+    pub tc_mods: u64,
     pub instances: u64,
     pub lights: u64,
     pub bsp_nodes: u64,
@@ -116,7 +118,16 @@ pub struct FrameConstants {
     /// The lights are not those of the frame before: gradients tell where that matters.
     pub changed: u32,
     pub filter_levels: u32,
-    pub padding: u32,
+    /// The scene's time: [`crate::scene::clock`].
+    pub clock: u32,
+    /// Lit layers may be shaded instead of what is behind them.
+    pub choose_layers: u32,
+    /// The scene has layers that tint light.
+    pub light_filters: u32,
+    /// What emits is seen as 0: the game shows it, 1: it lights.
+    pub shown_emission: u32,
+    /// Instances move: where a surface was is in the image `motion`.
+    pub moving: u32,
 }
 
 /// Push constants of every pass.

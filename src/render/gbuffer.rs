@@ -5,7 +5,7 @@ use ash::vk;
 use std::sync::Arc;
 
 /// Name and format of every image, in the order of their bindings in set 1.
-const IMAGES: [(&str, vk::Format); 18] = [
+const IMAGES: [(&str, vk::Format); 21] = [
     ("albedo", vk::Format::R32G32B32A32_SFLOAT),
     ("position", vk::Format::R32G32B32A32_SFLOAT),
     ("surface", vk::Format::R32G32B32A32_UINT),
@@ -24,6 +24,9 @@ const IMAGES: [(&str, vk::Format); 18] = [
     ("filter b", vk::Format::R16G16B16A16_UINT),
     ("gradient a", vk::Format::R32G32B32A32_SFLOAT),
     ("gradient b", vk::Format::R32G32B32A32_SFLOAT),
+    ("share", vk::Format::R32G32B32A32_SFLOAT),
+    ("layers", vk::Format::R32G32B32A32_SFLOAT),
+    ("mean layers", vk::Format::R32G32B32A32_SFLOAT),
 ];
 
 /// Name and format of every image that the next frame reads too: this frame's and the one before's stand side by side in set
@@ -99,7 +102,10 @@ accessors!(
     filter_a = 14,
     filter_b = 15,
     gradient_a = 16,
-    gradient_b = 17;
+    gradient_b = 17,
+    share = 18,
+    layers = 19,
+    mean_layers = 20;
     guide = 0,
     irradiance = 1,
     moments = 2,

@@ -129,6 +129,7 @@ impl<'a> GpuRenderer<'a> {
             antialiasing: false,
             aperture: 0.0,
             random_lights: 1,
+            choose_layers: false,
             ..*settings
         };
         self.accumulate_one(&mut view, camera, &still, 0, 1)?;
@@ -178,11 +179,15 @@ pub fn shown_film(view: &ViewState) -> Result<Film, RenderError> {
     let mut film = Film::new(g.size.0, g.size.1);
     film.mean = radiance(view)?;
     film.samples.fill(1.0);
-    for (i, e) in floats(g.emission())?.iter().enumerate() {
-        // Anti-aliasing mixes neighbours: what a pixel's centre emits may be more than the pixel shows.
-        let shown = film.mean[i];
-        film.emission[i] = std::array::from_fn(|c| e[c].min(shown[c]));
-        film.direct[i] = std::array::from_fn(|c| shown[c] - film.emission[i][c]);
+    let (emission, share, layers) = (floats(g.emission())?, floats(g.share())?, floats(g.layers())?);
+    for i in 0..film.mean.len() {
+        for c in 0..3 {
+            // Anti-aliasing mixes neighbours: what a pixel's centre emits may be more than the pixel shows.
+            let shown = film.mean[i][c];
+            film.transparent[i][c] = layers[i][c].min(shown);
+            film.emission[i][c] = (emission[i][c] * share[i][c]).min(shown - film.transparent[i][c]);
+            film.direct[i][c] = shown - film.transparent[i][c] - film.emission[i][c];
+        }
     }
     Ok(film)
 }
@@ -196,21 +201,20 @@ pub fn film(view: &ViewState, count: u32) -> Result<Film, RenderError> {
     let mut film = Film::new(g.size.0, g.size.1);
     let (sums, lost) = (floats(g.mean())?, floats(g.compensation())?);
     let (direct, emission) = (floats(g.mean_direct())?, floats(g.mean_emission())?);
+    let layers = floats(g.mean_layers())?;
     let n = f64::from(count.max(1));
     for i in 0..film.mean.len() {
         film.samples[i] = count as f32;
         for c in 0..3 {
             let mean = (f64::from(sums[i][c]) - f64::from(lost[i][c])) / n;
             // The shares are summed without compensation and drift with the number of samples: they are used as shares.
-            let (direct, emission) = (f64::from(direct[i][c]), f64::from(emission[i][c]));
-            let scale = if direct + emission > 0.0 {
-                mean / (direct + emission)
-            } else {
-                0.0
-            };
+            let [direct, emission, layers] = [direct[i][c], emission[i][c], layers[i][c]].map(f64::from);
+            let sum = direct + emission + layers;
+            let scale = if sum > 0.0 { mean / sum } else { 0.0 };
             film.mean[i][c] = mean as f32;
             film.direct[i][c] = (direct * scale) as f32;
             film.emission[i][c] = (emission * scale) as f32;
+            film.transparent[i][c] = (layers * scale) as f32;
         }
         if count > 1 {
             film.variance[i] = (f64::from(sums[i][3]) / (n * (n - 1.0))) as f32;

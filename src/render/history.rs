@@ -4,6 +4,7 @@
 use super::frame::FrameInput;
 use super::frame_constants::FrameConstants;
 use super::settings::{Settings, Tonemap};
+use crate::scene::clock::Clock;
 
 /// Frames that nothing must have changed for until temporal anti-aliasing takes the image for a still one.
 const SETTLED: u32 = 1;
@@ -15,6 +16,17 @@ struct Key {
     reuses: bool,
     /// Averaged frames leave no histories.
     filtered: bool,
+}
+
+/// What of a scene changes with its clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Moving {
+    /// What is seen.
+    pub picture: bool,
+    /// What lights give.
+    pub lights: bool,
+    /// Where things stand.
+    pub geometry: bool,
 }
 
 /// The frame before, as one view remembers it.
@@ -31,6 +43,7 @@ fn key(input: &FrameInput) -> Key {
         exposure: 0.0,
         tonemap: Tonemap::Aces,
         view: 0,
+        clock: Clock::default(),
         ..input.settings
     };
     Key {
@@ -48,8 +61,14 @@ fn jitter(index: u32) -> [f32; 2] {
 
 impl FrameHistory {
     /// Completes a frame's constants with what it needs of the frame before, and remembers it. `revision` counts changes of
-    /// the scene.
-    pub fn advance(&mut self, constants: FrameConstants, input: &FrameInput, revision: u32) -> FrameConstants {
+    /// the scene, `moving` says what its clock does to it.
+    pub fn advance(
+        &mut self,
+        constants: FrameConstants,
+        input: &FrameInput,
+        revision: u32,
+        moving: Moving,
+    ) -> FrameConstants {
         let key = key(input);
         let (view, good) = match &self.before {
             Some((before, old)) => (*before, key.filtered && *old == key),
@@ -61,12 +80,13 @@ impl FrameHistory {
             && view.right == constants.right
             && view.half_width == constants.half_width
             && view.half_height == constants.half_height;
-        self.unchanged = if same_view && revision == self.revision {
+        let later = view.clock != constants.clock;
+        self.unchanged = if same_view && revision == self.revision && !(later && (moving.picture || moving.geometry)) {
             self.unchanged.saturating_add(1)
         } else {
             0
         };
-        let changed = revision != self.revision;
+        let changed = revision != self.revision || (later && (moving.lights || moving.geometry));
         self.revision = revision;
         let jitter = match (input.anti_aliases(), input.denoises()) {
             (true, _) if input.settings.antialiasing => jitter(input.sample_index),

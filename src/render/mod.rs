@@ -15,6 +15,7 @@ pub mod gpu_renderer;
 pub mod gradient;
 pub mod gradient_atrous;
 pub mod history;
+pub mod moving;
 pub mod pass;
 pub mod primary;
 pub mod realtime;

@@ -5,8 +5,8 @@ use super::frame_constants::Push;
 use super::gbuffer::GBuffer;
 use super::scene_gpu::SceneGpu;
 use crate::gpu::{
-    Commands, ComputePipeline, ComputePipelineDesc, DescriptorLayout, Device, GpuError, PipelineCache, Timestamps,
-    Tracker, Use, shader_table,
+    Commands, ComputePipeline, ComputePipelineDesc, DescriptorLayout, DescriptorSets, Device, GpuError, PipelineCache,
+    Timestamps, Tracker, Use, shader_table,
 };
 use std::sync::Arc;
 
@@ -25,6 +25,8 @@ pub struct Recorder<'a> {
     pub tracker: &'a mut Tracker,
     pub timestamps: Option<&'a Timestamps>,
     pub scene: &'a SceneGpu,
+    /// Set 0.
+    pub scene_sets: &'a DescriptorSets,
     pub gbuffer: &'a GBuffer,
     pub push: Push,
 }
@@ -89,7 +91,7 @@ impl Pass {
         groups: [u32; 3],
     ) -> Result<(), GpuError> {
         r.tracker.pass(r.cmd, uses)?;
-        let sets = [r.scene.sets.raw(0), r.gbuffer.sets.raw(r.gbuffer.parity)];
+        let sets = [r.scene_sets.raw(0), r.gbuffer.sets.raw(r.gbuffer.parity)];
         let run = |cmd: &Commands<'_>| {
             self.pipeline.bind(cmd, &sets)?;
             self.pipeline.push(cmd, &r.push)?;

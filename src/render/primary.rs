@@ -31,6 +31,8 @@ impl Primary {
             g.view(),
             g.motion(),
             g.emission(),
+            g.share(),
+            g.layers(),
             g.guide().now(g.parity),
         ] {
             uses.push(Use::image(image, Access::ComputeWrite));

@@ -3,6 +3,7 @@
 use super::backend::Backend;
 use super::bvh_upload::{MeshTrees, TreeError, instance_tree};
 use super::frame_constants::FrameConstants;
+use super::history::Moving;
 use crate::assets::image::SRGB_TO_LINEAR;
 use crate::gpu::acceleration::{
     BottomDesc, BottomLevel, BuildPreference, BuildStatistics, TopInstance, TopLevel, TriangleGeometry,
@@ -14,7 +15,10 @@ use crate::gpu::{
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
-use crate::scene::records::{Instance, Light, NONE, TextureInfo};
+use crate::scene::clock::Clock;
+use crate::scene::entity_geometry::Placement;
+use crate::scene::records::{Instance, Light, MATERIAL_FILTER, NONE, TextureInfo};
+use crate::scene::static_geometry::Mesh;
 use ash::vk;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -62,7 +66,8 @@ pub struct BvhBuffers {
 /// Structures of the driver's traversal.
 pub struct DriverStructures {
     _index_buffer: Buffer,
-    _bottom: Vec<BottomLevel>,
+    /// One of each mesh that has triangles.
+    bottom: Vec<Option<BottomLevel>>,
     pub top: TopLevel,
     pub statistics: BuildStatistics,
 }
@@ -75,6 +80,15 @@ pub struct SceneGpu {
     pub attributes: Buffer,
     pub triangles: Buffer,
     pub materials: Buffer,
+    pub stages: Buffer,
+    pub tc_mods: Buffer,
+    /// The scene has layers that tint light.
+    pub light_filters: bool,
+    pub moving: Moving,
+    pub name: String,
+    /// Where meshes stand, and how they move.
+    pub placements: Vec<Placement>,
+    pub meshes: Vec<Mesh>,
     pub instances: Buffer,
     pub instance_count: u32,
     pub lights: Buffer,
@@ -98,8 +112,8 @@ pub struct SceneGpu {
     pub all_row: u32,
     pub bvh: BvhBuffers,
     pub driver: Option<DriverStructures>,
-    _textures: Vec<Image>,
-    _sampler: Sampler,
+    textures: Vec<Image>,
+    sampler: Sampler,
     pub layout: Arc<DescriptorLayout>,
     pub sets: DescriptorSets,
     revision: AtomicU32,
@@ -132,9 +146,14 @@ impl SceneGpu {
         backend: Backend,
         quality: BvhQuality,
     ) -> Result<Self, RenderError> {
-        let instances: Vec<Instance> = scene.placements.iter().map(|p| p.record(&scene.geometry)).collect();
+        let start = Clock::default();
+        let instances: Vec<Instance> = scene
+            .placements
+            .iter()
+            .map(|p| p.record(&scene.geometry.meshes, start, start))
+            .collect();
         let trees = MeshTrees::build(scene, quality)?;
-        let others = instance_tree(&scene.geometry, &instances, &scene.name)?;
+        let others = instance_tree(&scene.geometry.meshes, &instances, &scene.name)?;
         // Where no model but the world is drawn, there is no tree over the others to walk.
         let instance_count = if others.is_some() {
             instances.len()
@@ -173,6 +192,8 @@ impl SceneGpu {
         let attributes = buffer!("attributes", &g.attributes, none);
         let triangles = buffer!("triangles", &g.triangles, none);
         let materials = buffer!("materials", &scene.materials, none);
+        let stages = buffer!("stages", &scene.stages, none);
+        let tc_mods = buffer!("texture coordinate changes", &scene.tc_mods, none);
         let instance_records = buffer!("instances", &instances, none);
         let lights = buffer!("lights", &scene.lights.lights, none);
         let light_nodes = buffer!("light nodes", &scene.lights.tree.nodes, none);
@@ -253,7 +274,7 @@ impl SceneGpu {
         let index_buffer = take(index_buffer)?;
         let driver = driver.map(|(bottom, top, statistics)| DriverStructures {
             _index_buffer: index_buffer,
-            _bottom: bottom,
+            bottom,
             top,
             statistics,
         });
@@ -266,6 +287,17 @@ impl SceneGpu {
             attributes: take(attributes)?,
             triangles: take(triangles)?,
             materials: take(materials)?,
+            stages: take(stages)?,
+            tc_mods: take(tc_mods)?,
+            moving: Moving {
+                picture: scene.material_sources.iter().any(|m| m.program.animated),
+                lights: scene.material_sources.iter().any(|m| m.program.moving_emission),
+                geometry: scene.placements.iter().any(|p| p.motion.moves()),
+            },
+            name: scene.name.clone(),
+            placements: scene.placements.clone(),
+            meshes: scene.geometry.meshes.clone(),
+            light_filters: scene.materials.iter().any(|m| m.flags & MATERIAL_FILTER != 0),
             instances: take(instance_records)?,
             instance_count,
             lights: take(lights)?,
@@ -305,8 +337,8 @@ impl SceneGpu {
                 instance_root: others.root,
             },
             driver,
-            _textures: textures,
-            _sampler: sampler,
+            textures,
+            sampler,
             layout,
             sets,
             revision: AtomicU32::new(0),
@@ -328,6 +360,14 @@ impl SceneGpu {
         Ok(())
     }
 
+    /// Another set 0 with the scene's textures, for a view with a top level of its own.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn texture_sets(&self) -> Result<DescriptorSets, GpuError> {
+        texture_sets(&self.layout, &self.textures, &self.sampler)
+    }
+
     /// Number of changes so far.
     pub fn revision(&self) -> u32 {
         self.revision.load(Ordering::Relaxed)
@@ -342,6 +382,9 @@ impl SceneGpu {
             attributes: self.attributes.address(),
             triangles: self.triangles.address(),
             materials: self.materials.address(),
+            stages: self.stages.address(),
+            tc_mods: self.tc_mods.address(),
+            light_filters: u32::from(self.light_filters),
             instances: self.instances.address(),
             lights: self.lights.address(),
             light_nodes: self.light_nodes.address(),
@@ -400,14 +443,42 @@ fn scene_set(
     }
     bindings.push(Binding::variable(1, BindingKind::Texture, count.max(1)));
     let layout = DescriptorLayout::new(device, "scene", &bindings)?;
-    let sets = DescriptorSets::new(&layout, 1, count.max(1))?;
-    let sampled: Vec<_> = textures.iter().map(|image| SampledTexture { image, sampler }).collect();
-    let mut writes = vec![Write::textures(1, 0, &sampled)];
+    let sets = texture_sets(&layout, textures, sampler)?;
     if let Some(driver) = driver {
-        writes.push(Write::acceleration_structure(0, &driver.top));
+        sets.write(0, &[Write::acceleration_structure(0, &driver.top)])?;
     }
-    sets.write(0, &writes)?;
     Ok((layout, sets))
+}
+
+/// A set 0 with the textures; its top level is still to be written.
+fn texture_sets(
+    layout: &Arc<DescriptorLayout>,
+    textures: &[Image],
+    sampler: &Sampler,
+) -> Result<DescriptorSets, GpuError> {
+    let sets = DescriptorSets::new(layout, 1, textures.len().max(1) as u32)?;
+    let sampled: Vec<_> = textures.iter().map(|image| SampledTexture { image, sampler }).collect();
+    sets.write(0, &[Write::textures(1, 0, &sampled)])?;
+    Ok(sets)
+}
+
+/// What a top level is built of: instances of meshes that have triangles.
+pub fn placed_instances(driver: &DriverStructures, instances: &[Instance]) -> Vec<TopInstance> {
+    placed(&driver.bottom, instances)
+}
+
+fn placed(bottom: &[Option<BottomLevel>], instances: &[Instance]) -> Vec<TopInstance> {
+    instances
+        .iter()
+        .enumerate()
+        .filter_map(|(index, instance)| {
+            let level = bottom[instance.mesh as usize].as_ref()?;
+            Some(TopInstance {
+                transform: instance.object_to_world,
+                ..TopInstance::new(level, index as u32)
+            })
+        })
+        .collect()
 }
 
 /// Geometry 0 of every bottom level is opaque, geometry 1 alpha-tested; a mesh without triangles is not placed.
@@ -417,7 +488,7 @@ fn build_driver_structures(
     instances: &[Instance],
     positions: &Buffer,
     indices: &Buffer,
-) -> Result<(Vec<BottomLevel>, TopLevel, BuildStatistics), GpuError> {
+) -> Result<(Vec<Option<BottomLevel>>, TopLevel, BuildStatistics), GpuError> {
     let g = &scene.geometry;
     let used: Vec<usize> = (0..g.meshes.len())
         .filter(|&m| g.meshes[m].triangle_count > 0)
@@ -451,22 +522,15 @@ fn build_driver_structures(
         })
         .collect();
     let (bottom, statistics) = BottomLevel::build(device, &descriptions)?;
-    let level_of = |mesh: u32| used.iter().position(|&m| m == mesh as usize);
-    let placed: Vec<TopInstance> = instances
-        .iter()
-        .enumerate()
-        .filter_map(|(index, instance)| {
-            let level = &bottom[level_of(instance.mesh)?];
-            Some(TopInstance {
-                transform: instance.object_to_world,
-                ..TopInstance::new(level, index as u32)
-            })
-        })
-        .collect();
+    let mut levels: Vec<Option<BottomLevel>> = (0..g.meshes.len()).map(|_| None).collect();
+    for (mesh, level) in used.into_iter().zip(bottom) {
+        levels[mesh] = Some(level);
+    }
+    let placed = placed(&levels, instances);
     let mut top = TopLevel::new(device, "top level", placed.len().max(1) as u32, 1)?;
     device.submit_once("top level", |cmd| {
         top.record_build(cmd, &placed, 0)?;
         Ok(())
     })?;
-    Ok((bottom, top, statistics))
+    Ok((levels, top, statistics))
 }

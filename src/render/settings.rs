@@ -1,5 +1,6 @@
 //! Settings of a frame, independent of where they come from.
 
+use crate::scene::clock::Clock;
 use crate::scene::sampling::Sequence;
 
 /// Curve from exposed radiance to the display.
@@ -36,6 +37,16 @@ pub enum AmbientLight {
     Constant = 1,
     /// What is left over of the light grid.
     Grid = 2,
+}
+
+/// How bright what emits is to the eye. It lights the same in either case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum ShownEmission {
+    /// As the game shows it: a picture at display brightness.
+    Game = 0,
+    /// With the radiance that it lights with, often a hundred times what is around it.
+    Radiance = 1,
 }
 
 /// What the estimators and the output stage are asked to do.
@@ -90,6 +101,11 @@ pub struct Settings {
     pub taa_gamma: f32,
     /// Select texture levels by the ray's footprint; else level 0.
     pub filter_textures: bool,
+    pub shown_emission: ShownEmission,
+    /// Shade lit layers, one of them and what is behind at random; else only what is behind.
+    pub choose_layers: bool,
+    /// The scene's time.
+    pub clock: Clock,
 }
 
 impl Settings {
@@ -148,6 +164,9 @@ impl Default for Settings {
             taa: true,
             taa_gamma: 2.0,
             filter_textures: true,
+            shown_emission: ShownEmission::Game,
+            choose_layers: true,
+            clock: Clock::default(),
         }
     }
 }

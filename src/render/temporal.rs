@@ -24,6 +24,7 @@ impl Temporal {
         let g = r.gbuffer;
         let read = [
             g.direct(),
+            g.motion(),
             g.gradient_a(),
             g.guide().now(g.parity),
             g.guide().before(g.parity),

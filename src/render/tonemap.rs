@@ -3,8 +3,10 @@
 use super::settings::Tonemap;
 use crate::assets::image::encode_srgb;
 
-/// Luminance that the log-average of an image is brought to.
-pub const KEY: f32 = 0.18;
+/// Exposure of the game: luxels of 64 show textures as they are.
+pub const GAME_EXPOSURE: f32 = 255.0 / 64.0;
+/// Log-average of the exposed luminance at which the automatic exposure is the game's.
+pub const KEY: f32 = 0.12;
 /// Radiance below this counts as this much in the log-average, so that black pixels do not blow the exposure up.
 pub const LUMINANCE_FLOOR: f32 = 1e-4;
 /// Range of the automatic exposure.
@@ -18,7 +20,8 @@ pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
 /// Cells per image edge whose means enter the log-average: noise, most of it black pixels, must not raise the exposure.
 const EXPOSURE_CELLS: usize = 32;
 
-/// Exposure that brings the log-average of the luminance of 32 x 32 cells to [`KEY`].
+/// Exposure that goes half the way, in the logarithm, from the game's to what brings the log-average of the luminance of 32 x
+/// 32 cells to [`KEY`]: dark maps stay dark, and something is seen in them.
 pub fn automatic_exposure(pixels: &[[f32; 3]], width: u32, height: u32) -> f32 {
     let (w, h) = (width as usize, height as usize);
     let (nx, ny) = (w.min(EXPOSURE_CELLS), h.min(EXPOSURE_CELLS));
@@ -32,7 +35,9 @@ pub fn automatic_exposure(pixels: &[[f32; 3]], width: u32, height: u32) -> f32 {
     }
     let log = |&(sum, n): &(f64, u32)| (sum / f64::from(n.max(1))).max(f64::from(LUMINANCE_FLOOR)).ln();
     let average = (sums.iter().map(log).sum::<f64>() / sums.len().max(1) as f64).exp() as f32;
-    (KEY / average).clamp(EXPOSURE_RANGE.0, EXPOSURE_RANGE.1)
+    (GAME_EXPOSURE * KEY / average)
+        .sqrt()
+        .clamp(EXPOSURE_RANGE.0, EXPOSURE_RANGE.1)
 }
 
 fn curve(x: f32, tonemap: Tonemap) -> f32 {

@@ -3,6 +3,7 @@
 use super::frame_constants::FrameConstants;
 use super::gbuffer::GBuffer;
 use super::history::FrameHistory;
+use super::moving::Moving;
 use super::reservoirs::Reservoirs;
 use super::strata::Strata;
 use crate::gpu::{Buffer, DescriptorLayout, Device, GpuError, MemoryKind, Tracker};
@@ -28,6 +29,8 @@ pub struct ViewState {
     pub reservoirs: Option<Reservoirs>,
     pub strata: Strata,
     pub history: FrameHistory,
+    /// Made when a frame first shows a scene in which something moves.
+    pub moving: Option<Moving>,
     /// Whether the last frame shows the image `taa`, else `composite`.
     pub anti_aliased: bool,
 }
@@ -73,6 +76,7 @@ impl ViewState {
             reservoirs: None,
             strata: Strata::new(device, size)?,
             history: FrameHistory::default(),
+            moving: None,
             anti_aliased: false,
         })
     }

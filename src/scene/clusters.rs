@@ -206,6 +206,13 @@ pub struct LightRows {
     pub all_row: u32,
 }
 
+impl LightRows {
+    /// Row of receivers on a surface of the map that lie in no cluster; of all lights for what is no such surface.
+    pub fn fallback(&self, surface: u32) -> u32 {
+        self.surface_row.get(surface as usize).copied().unwrap_or(self.all_row)
+    }
+}
+
 /// Margin by which a cluster's receivers may lie outside its leafs: the largest nudge, and rounding of leaf bounds.
 const RECEIVER_MARGIN: f32 = NUDGES[NUDGES.len() - 1] + 1.0;
 

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 /// Radiance of `q3map_surfacelight 1` in luxel units: v = 0.75·N·F, 255 byte units are 1.
 pub const SURFACE_LIGHT_RADIANCE: f32 = 0.75 / 255.0;
-/// Decoded texel means below this are taken for black: such a channel emits evenly.
+/// Decoded texel means below this are taken for black.
 const BLACK: f32 = 1e-3;
 
 /// Emission of a surface.
@@ -42,14 +42,19 @@ pub fn emission_colour<'a>(rgb: Option<Vec3>, mut images: impl Iterator<Item = &
     max_one(colour.unwrap_or(Vec3::ONE).max(Vec3::ZERO))
 }
 
+/// The factor that gives what shows `mean` on average a radiance, but for channels that are next to black, which get less;
+/// `None` for what is black altogether.
+pub fn normalised(radiance: Vec3, mean: Vec3) -> Option<Vec3> {
+    (mean.max_element() >= BLACK).then(|| radiance / mean.max(Vec3::splat(BLACK)))
+}
+
 /// Splits emission into the factor and texture of a material record: factor × decoded texel has the emission's mean.
 pub fn normalised_texture(emission: &Emission, textures: &[Texture]) -> (Vec3, Option<u32>) {
-    let Some(texture) = emission.texture else {
-        return (emission.radiance, None);
-    };
-    let mean = Vec3::from(textures[texture as usize].mean_linear);
-    if mean.min_element() < BLACK {
-        return (emission.radiance, None);
+    let scaled = emission
+        .texture
+        .and_then(|t| normalised(emission.radiance, Vec3::from(textures[t as usize].mean_linear)));
+    match scaled {
+        Some(scaled) => (scaled, emission.texture),
+        None => (emission.radiance, None),
     }
-    (emission.radiance / mean, Some(texture))
 }

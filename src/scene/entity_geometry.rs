@@ -1,24 +1,28 @@
-//! Entities that place geometry: brush models.
+//! Entities that place geometry: brush models and items.
 
+use super::clock::Clock;
+use super::items::PlacedItem;
+use super::motion::Motion;
 use super::records::Instance;
-use super::static_geometry::Geometry;
+use super::static_geometry::Mesh;
+use crate::assets::bsp::Bsp;
 use crate::assets::entities::Entity;
 use glam::{Affine3A, Vec3};
 
-/// A mesh standing somewhere in the world.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A mesh standing or moving somewhere in the world.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     pub mesh: u32,
-    pub object_to_world: Affine3A,
+    pub motion: Motion,
 }
 
 /// The world, then every brush model that an entity of the lump shows, in entity order.
-pub fn placements(entities: &[Entity], mesh_count: usize) -> Vec<Placement> {
+pub fn placements(bsp: &Bsp, entities: &[Entity]) -> Vec<Placement> {
     let mut out = Vec::new();
-    if mesh_count > 0 {
+    if !bsp.models.is_empty() {
         out.push(Placement {
             mesh: 0,
-            object_to_world: Affine3A::IDENTITY,
+            motion: Motion::Still(Affine3A::IDENTITY),
         });
     }
     for entity in entities {
@@ -26,32 +30,52 @@ pub fn placements(entities: &[Entity], mesh_count: usize) -> Vec<Placement> {
         let Some(mesh) = model.and_then(|m| m.parse::<u32>().ok()) else {
             continue;
         };
-        if mesh == 0 || mesh as usize >= mesh_count {
+        let Some(model) = bsp.models.get(mesh as usize).filter(|_| mesh != 0) else {
             continue;
-        }
-        let origin = entity.vector("origin").unwrap_or(Vec3::ZERO);
+        };
+        let (mins, maxs) = (Vec3::from(model.mins), Vec3::from(model.maxs));
         out.push(Placement {
             mesh,
-            object_to_world: Affine3A::from_translation(origin),
+            motion: Motion::of_brush_model(entity, entities, mins, maxs),
         });
     }
     out
 }
 
+/// Where an item's models stand; `meshes` are theirs, `middles` the middles of their boxes.
+pub fn item_placements(item: &PlacedItem, meshes: [Option<u32>; 2], middles: [Vec3; 2]) -> Vec<Placement> {
+    (0..2)
+        .filter_map(|i| {
+            Some(Placement {
+                mesh: meshes[i]?,
+                motion: item.motion(i == 1, middles[i]),
+            })
+        })
+        .collect()
+}
+
+fn rows(m: Affine3A) -> [[f32; 4]; 3] {
+    let (x, y, z, t) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation);
+    [[x.x, y.x, z.x, t.x], [x.y, y.y, z.y, t.y], [x.z, y.z, z.z, t.z]]
+}
+
 impl Placement {
-    /// The record that tracers read.
-    pub fn record(&self, geometry: &Geometry) -> Instance {
-        let rows = |m: Affine3A| {
-            let (x, y, z, t) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation);
-            [[x.x, y.x, z.x, t.x], [x.y, y.y, z.y, t.y], [x.z, y.z, z.z, t.z]]
-        };
+    /// Mesh to world at a moment.
+    pub fn pose(&self, clock: Clock) -> Affine3A {
+        self.motion.pose(clock)
+    }
+
+    /// The record that tracers read. `before`: the moment of the frame before.
+    pub fn record(&self, meshes: &[Mesh], clock: Clock, before: Clock) -> Instance {
+        let pose = self.pose(clock);
         Instance {
-            object_to_world: rows(self.object_to_world),
-            world_to_object: rows(self.object_to_world.inverse()),
-            first_triangle: geometry.meshes[self.mesh as usize].first_triangle,
+            object_to_world: rows(pose),
+            world_to_object: rows(pose.inverse()),
+            old_object_to_world: rows(self.pose(before)),
+            first_triangle: meshes[self.mesh as usize].first_triangle,
             mesh: self.mesh,
-            identity: u32::from(self.object_to_world == Affine3A::IDENTITY),
-            padding: 0,
+            identity: u32::from(pose == Affine3A::IDENTITY),
+            moves: u32::from(self.motion.moves()),
         }
     }
 }

@@ -8,7 +8,7 @@ use super::records::{
     LIGHT_DOME, LIGHT_EVEN, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE,
     LIGHT_TWO_SIDED, Light, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
 };
-use super::static_geometry::Geometry;
+use super::static_geometry::{Geometry, Mesh};
 use crate::assets::bsp::{Bounds, Bsp};
 use crate::assets::entities::Entity;
 use crate::assets::shader_script::Sun;
@@ -84,6 +84,13 @@ pub struct LightInputs<'a> {
     pub clusters: &'a ClusterMap,
 }
 
+impl LightInputs<'_> {
+    /// The map's own meshes, with their numbers: models of items light nothing.
+    fn map_meshes(&self) -> impl Iterator<Item = (usize, &Mesh)> {
+        self.geometry.meshes.iter().enumerate().take(self.bsp.models.len())
+    }
+}
+
 impl LightTable {
     /// Appends a light.
     pub fn push(&mut self, source: LightSource, light: Light, reach: LightReach) {
@@ -100,7 +107,7 @@ impl LightTable {
     /// Collects the lights: surfaces, entities, suns and domes, in the order of the tree over them.
     pub fn collect(inputs: &LightInputs) -> Self {
         let mut table = Self::default();
-        for (index, mesh) in inputs.geometry.meshes.iter().enumerate() {
+        for (index, mesh) in inputs.map_meshes() {
             let Some(placement) = inputs.placements[index] else {
                 continue;
             };
@@ -423,7 +430,7 @@ fn clusters_of_triangle(inputs: &LightInputs, corners: [Vec3; 3], surface: u32, 
 
 /// Calls with the corners, surface and whether it may move of every traced triangle of a sky.
 fn for_sky_triangles(inputs: &LightInputs, mut found: impl FnMut([Vec3; 3], u32, bool)) {
-    for (index, mesh) in inputs.geometry.meshes.iter().enumerate() {
+    for (index, mesh) in inputs.map_meshes() {
         let Some(placement) = inputs.placements[index] else {
             continue;
         };

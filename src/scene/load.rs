@@ -1,12 +1,15 @@
 //! From a map's files to a scene.
 
 use super::ambient::Ambient;
+use super::clock::Clock;
 use super::clusters::{ClusterMap, LightRows, bsp_records, build_light_rows};
 use super::entity_geometry::{self, Placement};
+use super::items;
 use super::light_cells::LightCells;
 use super::lights::{LightInputs, LightTable};
 use super::material::MaterialSource;
-use super::records::{BspNode, Material};
+use super::models::Models;
+use super::records::{BspNode, Material, Stage, TcMod};
 use super::spawns::{Spawn, spawns};
 use super::static_geometry::{self, Geometry};
 use super::textures::TextureRequests;
@@ -16,7 +19,7 @@ use crate::assets::image::Texture;
 use crate::assets::shader_script::ShaderLibrary;
 use crate::assets::vfs::search_path::map_path;
 use crate::assets::vfs::{FileSource, VfsError};
-use glam::Affine3A;
+use glam::{Affine3A, Vec3};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -38,9 +41,12 @@ pub struct Scene {
     pub entities: Vec<Entity>,
     pub spawns: Vec<Spawn>,
     pub textures: Vec<Texture>,
-    /// One per shader entry of the map.
+    /// One per shader entry of the map, then those of models.
     pub material_sources: Vec<MaterialSource>,
     pub materials: Vec<Material>,
+    /// Stages of all materials, and their changes of texture coordinates.
+    pub stages: Vec<Stage>,
+    pub tc_mods: Vec<TcMod>,
     pub geometry: Geometry,
     /// Where meshes stand; placement 0 is the world.
     pub placements: Vec<Placement>,
@@ -123,19 +129,43 @@ impl Scene {
             .iter()
             .map(|s| MaterialSource::new(&s.name.text(), s.surface_flags, &scripts, &mut requests))
             .collect();
+        let mut models = Models::default();
+        let items = items::placed(&bsp, &entities);
+        let mut item_models = Vec::new();
+        for item in &items {
+            let mut number = |path: &str| {
+                if path.is_empty() {
+                    return Ok(None);
+                }
+                models.number(path, files, &scripts, &mut material_sources, &mut requests)
+            };
+            item_models.push([number(item.item.models[0])?, number(item.item.models[1])?]);
+        }
+        warnings.append(&mut models.warnings);
+        watch.lap("models");
         let (textures, missing) = requests.load(files);
         warnings.extend(missing);
         for source in &mut material_sources {
             source.resolve(&textures);
         }
-        let materials: Vec<Material> = material_sources.iter().map(|m| m.record(&textures)).collect();
+        let (mut stages, mut tc_mods) = (Vec::new(), Vec::new());
+        let materials: Vec<Material> = material_sources
+            .iter()
+            .map(|m| m.record(&textures, &mut stages, &mut tc_mods))
+            .collect();
         watch.lap("textures");
         let emits: Vec<bool> = material_sources.iter().map(|m| m.surface_light().is_some()).collect();
-        let mut geometry = static_geometry::build(&bsp, &material_sources, &emits);
+        let mut geometry = static_geometry::build(&bsp, &material_sources, &emits, &models);
         if geometry.meshes.is_empty() {
             warnings.push("the map has no world model: nothing is drawn".to_owned());
         }
-        let placements = entity_geometry::placements(&entities, geometry.meshes.len());
+        let mut placements = entity_geometry::placements(&bsp, &entities);
+        let first_model = bsp.models.len() as u32;
+        for (item, numbers) in items.iter().zip(item_models) {
+            let middles = numbers.map(|n| n.map_or(Vec3::ZERO, |n| models.middle(n)));
+            let meshes = numbers.map(|n| n.map(|n| n + first_model));
+            placements.extend(entity_geometry::item_placements(item, meshes, middles));
+        }
         watch.lap("geometry");
         let worldspawn = entities.iter().find(|e| e.class() == "worldspawn");
         let far_plane = worldspawn
@@ -154,7 +184,7 @@ impl Scene {
         });
         let rows = build_light_rows(&clusters, &lights.reach, &lights.weights);
         for t in &mut geometry.triangles {
-            t.fallback_row = rows.surface_row[t.surface as usize];
+            t.fallback_row = rows.fallback(t.surface);
         }
         watch.lap("lights");
         Ok(Self {
@@ -166,6 +196,8 @@ impl Scene {
             textures,
             material_sources,
             materials,
+            stages,
+            tc_mods,
             geometry,
             placements,
             lights,
@@ -201,7 +233,7 @@ impl Scene {
         lights.put_in_order();
         self.rows = build_light_rows(&self.clusters, &lights.reach, &lights.weights);
         for t in &mut self.geometry.triangles {
-            t.fallback_row = self.rows.surface_row[t.surface as usize];
+            t.fallback_row = self.rows.fallback(t.surface);
         }
         self.lights = lights;
         self.cells = LightCells::default();
@@ -212,7 +244,7 @@ impl Scene {
 fn first_placements(placements: &[Placement], meshes: usize) -> Vec<Option<Affine3A>> {
     let mut first = vec![None; meshes];
     for p in placements {
-        first[p.mesh as usize].get_or_insert(p.object_to_world);
+        first[p.mesh as usize].get_or_insert(p.pose(Clock::default()));
     }
     first
 }

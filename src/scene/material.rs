@@ -1,25 +1,27 @@
 //! Materials: what a shader script (or a bare image) means to the tracer.
 //!
-//! One base image stands for the surface's albedo, with the script's alpha test; layered, animated and see-through stages
-//! are described in `docs/limitations.md`.
+//! What the stages of a script come to is in [`super::program`]; here is what decides about the surface as a whole.
 
-use super::emission::{Emission, emission_colour, normalised_texture};
+use super::emission::{Emission, emission_colour, normalised, normalised_texture};
+use super::program::{Program, UNLIT};
 use super::records::{
-    MATERIAL_ALPHA_TESTED, MATERIAL_CLAMP, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
+    MATERIAL_ALPHA_TESTED, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_MOVING_EMISSION,
+    MATERIAL_NO_FRONT, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
+    Stage as StageRecord, TcMod,
 };
 use super::textures::{CHECKER, TextureRequests, WHITE};
 use crate::assets::bsp::lumps::surface_flags;
 use crate::assets::image::Texture;
 use crate::assets::shader_script::{
-    AlphaFunc, BlendFactor, Image, Shader, ShaderLibrary, Stage, StageTexture, Sun, TcGen,
+    AlphaFunc, BlendFactor, Cull, Image, Shader, ShaderLibrary, SkyParms, Sort, Stage, StageTexture, Sun, TcGen,
 };
 use glam::Vec3;
 
 /// Suffixes of a sky box's images in the order of [`Material::sky`].
 const SKY_SIDES: [&str; 6] = ["rt", "lf", "bk", "ft", "up", "dn"];
-/// Radiance of a sky that lights nothing, over its decoded image: what the game shows beside a surface lit by luxels of
-/// 64, its display's unit.
-const UNLIT_SKY: f32 = 64.0 / 255.0;
+/// How far a layer stands off what it lies on, units per step of the game's drawing order after opaque surfaces: a decal
+/// shares its place with a wall, and rays must meet the two in that order.
+const LIFT: f32 = 1.0 / 64.0;
 
 /// The compiler's `q3map_backsplash` where a script has none.
 const BACKSPLASH: [f32; 2] = [5.0, 23.0];
@@ -44,8 +46,8 @@ pub enum Visibility {
     AlphaTested,
     /// Shows the sky: stops rays to finite lights, lets sun and sky light in.
     Sky,
-    /// Blended over what is behind it: not traced.
-    Blended,
+    /// What is behind shows through.
+    Layer,
     /// Never drawn (nodraw, fog volumes, flares).
     Invisible,
 }
@@ -55,6 +57,8 @@ pub enum Visibility {
 pub struct MaterialSource {
     pub name: String,
     pub visibility: Visibility,
+    /// An MD3 model asked for it.
+    pub of_model: bool,
     /// The script has a definition for the name.
     pub scripted: bool,
     texture: u32,
@@ -65,6 +69,12 @@ pub struct MaterialSource {
     sky_box: Option<[u32; 6]>,
     pub two_sided: bool,
     pub autosprite: bool,
+    cull: Cull,
+    /// Distance along its normals that a surface stands off its place, units.
+    pub lift: f32,
+    pub program: Program,
+    /// Height of a sky's clouds, units.
+    cloud_height: f32,
     emission: Option<EmissionSource>,
     pub suns: Vec<Sun>,
     /// `q3map_skylight`: intensity in byte units.
@@ -147,6 +157,7 @@ impl MaterialSource {
                     (_, true) => Visibility::Invisible,
                     _ => Visibility::Opaque,
                 },
+                of_model: false,
                 scripted: false,
                 texture: if hidden || sky { WHITE } else { requests.request(name) },
                 glow: WHITE,
@@ -155,6 +166,10 @@ impl MaterialSource {
                 sky_box: None,
                 two_sided: false,
                 autosprite: false,
+                cull: Cull::FrontSided,
+                lift: 0.0,
+                program: Program::default(),
+                cloud_height: SkyParms::DEFAULT_CLOUD_HEIGHT,
                 emission: None,
                 suns: Vec::new(),
                 sky_light: None,
@@ -170,6 +185,16 @@ impl MaterialSource {
         let colour_rgb = shader.compiler.light_rgb.filter(|c| *c != Vec3::ZERO);
         let sky_light = shader.compiler.sky_light.map(|s| s.intensity).filter(|&i| i > 0.0);
         let visibility = visibility(shader, flags);
+        let shows = !matches!(visibility, Visibility::Invisible);
+        let program = if shows {
+            Program::compile(
+                shader,
+                shader.emits().is_some() && visibility != Visibility::Sky,
+                requests,
+            )
+        } else {
+            Program::default()
+        };
         let texture = match (base.and_then(stage_image), visibility) {
             (Some(image), _) => image_texture(image, requests),
             (None, Visibility::Invisible | Visibility::Sky) => WHITE,
@@ -178,11 +203,12 @@ impl MaterialSource {
         Self {
             name: name.to_owned(),
             visibility,
+            of_model: false,
             scripted: true,
             texture,
             glow: glow.map_or(texture, |image| image_texture(image, requests)),
             clamp: matches!(base.and_then(|s| s.texture.as_ref()), Some(StageTexture::ClampMap(_))),
-            alpha_func: base.and_then(|s| s.alpha_func),
+            alpha_func: shader.drawn_stages().find_map(|s| s.alpha_func),
             sky_box: shader
                 .sky
                 .as_ref()
@@ -190,6 +216,13 @@ impl MaterialSource {
                 .map(|name| SKY_SIDES.map(|side| requests.request_candidate(&format!("{name}_{side}.tga")))),
             two_sided: shader.is_two_sided() || shader.is_fog(),
             autosprite: shader.is_autosprite(),
+            cull: shader.cull,
+            lift: lift(shader, visibility),
+            program,
+            cloud_height: shader
+                .sky
+                .as_ref()
+                .map_or(SkyParms::DEFAULT_CLOUD_HEIGHT, |sky| sky.cloud_height),
             emission: shader.emits().map(|value| EmissionSource {
                 value,
                 // Where nothing tells which part of the surface glows, a colour given apart means all of it.
@@ -243,47 +276,111 @@ impl MaterialSource {
         ))
     }
 
-    /// The record that the tracers read.
-    pub fn record(&self, textures: &[Texture]) -> Material {
+    /// The record that the tracers read; its stages are added to the scene's.
+    pub fn record(&self, textures: &[Texture], stages: &mut Vec<StageRecord>, mods: &mut Vec<TcMod>) -> Material {
         let mut record = Material {
             texture: self.texture,
             flags: if self.clamp { MATERIAL_CLAMP } else { 0 },
             alpha_scale: 0.0,
             alpha_offset: 1.0,
             emission: [0.0; 3],
+            shown: [0.0; 3],
             emission_texture: NONE,
             sky: [NONE; 6],
+            first_stage: stages.len() as u32,
+            stage_count: 0,
+            alpha_stage: NONE,
+            sky_scale: [0.0; 3],
+            cloud_height: self.cloud_height,
         };
-        if self.visibility == Visibility::AlphaTested {
+        self.stage_record(&mut record, stages, mods);
+        if let Some(test) = self.alpha_func
+            && matches!(self.visibility, Visibility::AlphaTested | Visibility::Layer)
+        {
             record.flags |= MATERIAL_ALPHA_TESTED;
             // Half a step of an 8-bit image keeps the comparison away from rounding: it passes where the script's does.
-            (record.alpha_scale, record.alpha_offset) = match self.alpha_func {
-                Some(AlphaFunc::Gt0) | None => (1.0, -0.5 / 255.0),
-                Some(AlphaFunc::Lt128) => (-1.0, 0.5),
-                Some(AlphaFunc::Ge128) => (1.0, -0.5 + 0.5 / 255.0),
+            (record.alpha_scale, record.alpha_offset) = match test {
+                AlphaFunc::Gt0 => (1.0, -0.5 / 255.0),
+                AlphaFunc::Lt128 => (-1.0, 0.5),
+                AlphaFunc::Ge128 => (1.0, -0.5 + 0.5 / 255.0),
             };
         }
         if self.two_sided {
             record.flags |= MATERIAL_TWO_SIDED_EMISSION;
         }
-        let emission = self.emission();
-        if let Some(e) = &emission {
-            let (scaled, texture) = normalised_texture(e, textures);
-            record.emission = scaled.into();
-            record.emission_texture = texture.unwrap_or(NONE);
+        if self.cull != Cull::FrontSided || self.visibility == Visibility::Sky || self.autosprite {
+            record.flags |= MATERIAL_BACK;
+        }
+        if self.cull == Cull::BackSided && !self.autosprite {
+            record.flags |= MATERIAL_NO_FRONT;
         }
         if self.visibility == Visibility::Sky {
-            self.sky_record(&mut record, emission.map(|e| e.radiance), textures);
+            self.sky_record(&mut record, self.emission().map(|e| e.radiance), textures);
+        } else if let Some(e) = self.emission() {
+            self.emission_record(&mut record, &e, textures);
         }
         record
     }
 
-    /// A sky's radiance follows its images; their mean is what the compiler lit the map with, where it did.
+    fn stage_record(&self, record: &mut Material, stages: &mut Vec<StageRecord>, mods: &mut Vec<TcMod>) {
+        if self.visibility == Visibility::Layer {
+            record.flags |= MATERIAL_LAYER;
+            if self.program.filters {
+                record.flags |= MATERIAL_FILTER;
+            }
+        }
+        if let Some((texture, clamp)) = self.program.plain {
+            record.texture = texture;
+            record.flags = record.flags & !MATERIAL_CLAMP | if clamp { MATERIAL_CLAMP } else { 0 };
+        } else if !self.program.stages.is_empty() {
+            record.flags |= MATERIAL_STAGES;
+        }
+        if record.flags & MATERIAL_STAGES == 0 && self.program.alpha_stage.is_none() {
+            return;
+        }
+        let first_mod = mods.len() as u32;
+        mods.extend(&self.program.mods);
+        record.stage_count = self.program.stages.len() as u32;
+        record.alpha_stage = self.program.alpha_stage.map_or(NONE, |s| record.first_stage + s);
+        stages.extend(self.program.stages.iter().map(|s| StageRecord {
+            first_mod: s.first_mod + first_mod,
+            ..*s
+        }));
+    }
+
+    /// Emission follows the stages that shine, where there are any; their mean is the compiler's.
+    fn emission_record(&self, record: &mut Material, emission: &Emission, textures: &[Texture]) {
+        let shining: Vec<&StageRecord> = self.program.emission_stages().collect();
+        record.shown = [UNLIT; 3];
+        if shining.is_empty() {
+            let (scaled, texture) = normalised_texture(emission, textures);
+            record.emission = scaled.into();
+            record.emission_texture = texture.unwrap_or(NONE);
+            if texture.is_none() {
+                record.shown = emission.radiance.min(self.colour * UNLIT).into();
+            }
+            return;
+        }
+        let Some(scaled) = normalised(emission.radiance, self.program.mean_emission(textures)) else {
+            record.emission = emission.radiance.into();
+            record.shown = emission.radiance.min(self.colour * UNLIT).into();
+            return;
+        };
+        record.emission = scaled.into();
+        if self.program.moving_emission || shining.len() > 1 {
+            record.flags |= MATERIAL_MOVING_EMISSION;
+        } else {
+            record.emission_texture = shining[0].textures[0];
+        }
+    }
+
+    /// A sky's radiance follows its images and clouds; their mean is what the compiler lit the map with, where it did.
     fn sky_record(&self, record: &mut Material, radiance: Option<Vec3>, textures: &[Texture]) {
         record.flags |= MATERIAL_SKY;
         let box_found = self
             .sky_box
             .filter(|sides| sides.iter().take(5).any(|&t| !textures[t as usize].missing));
+        let mut background = Vec3::ZERO;
         if let Some(sides) = box_found {
             record.flags |= MATERIAL_SKY_BOX;
             // A missing side (often the bottom) shows its opposite rather than a checker.
@@ -291,24 +388,43 @@ impl MaterialSource {
                 let t = sides[i];
                 if textures[t as usize].missing { sides[i ^ 1] } else { t }
             });
-            let mean: Vec3 = record
+            background = record
                 .sky
                 .iter()
                 .map(|&t| Vec3::from(textures[t as usize].mean_linear))
                 .sum::<Vec3>()
                 / 6.0;
-            let scale = match radiance {
-                Some(l) if mean.min_element() >= DARK_SKY => l / mean,
-                // A night sky has no hue to speak of: only its brightness is matched.
-                Some(l) => Vec3::splat(luminance(l) / luminance(mean).max(1e-4)),
-                None => Vec3::splat(UNLIT_SKY),
-            };
-            record.emission = scale.into();
-        } else {
-            let image = Vec3::from(textures[self.texture as usize].mean_linear);
-            record.emission = radiance.unwrap_or(image * UNLIT_SKY).into();
         }
+        let clouds = record.flags & MATERIAL_STAGES != 0;
+        if !clouds && box_found.is_none() {
+            let image = Vec3::from(textures[self.texture as usize].mean_linear);
+            record.emission = radiance.unwrap_or(image * UNLIT).into();
+            record.shown = (image * UNLIT).into();
+            return;
+        }
+        let mean = if clouds {
+            self.program.mean_picture(textures, background)
+        } else {
+            background
+        };
+        let scale = match radiance {
+            Some(l) if mean.min_element() >= DARK_SKY => l / mean,
+            // A night sky has no hue to speak of: only its brightness is matched.
+            Some(l) => Vec3::splat(luminance(l) / luminance(mean).max(1e-4)),
+            None => Vec3::splat(UNLIT),
+        };
+        record.sky_scale = scale.into();
+        record.shown = [UNLIT; 3];
+        record.emission = if clouds { scale * mean } else { scale }.into();
     }
+}
+
+/// Layers and decals stand off the surface they lie on, later ones farther.
+fn lift(shader: &Shader, visibility: Visibility) -> f32 {
+    if visibility != Visibility::Layer && !shader.polygon_offset {
+        return 0.0;
+    }
+    (shader.effective_sort().0 - Sort::OPAQUE.0).clamp(0.5, Sort::NEAREST.0) * LIFT
 }
 
 fn visibility(shader: &Shader, flags: i32) -> Visibility {
@@ -320,12 +436,11 @@ fn visibility(shader: &Shader, flags: i32) -> Visibility {
     if undrawn || shader.is_fog() {
         return Visibility::Invisible;
     }
-    let first = shader.drawn_stages().next();
-    if first.is_some_and(|s| s.alpha_func.is_some()) {
-        return Visibility::AlphaTested;
-    }
     if shader.is_blended() {
-        return Visibility::Blended;
+        return Visibility::Layer;
+    }
+    if shader.drawn_stages().any(|s| s.alpha_func.is_some()) {
+        return Visibility::AlphaTested;
     }
     Visibility::Opaque
 }

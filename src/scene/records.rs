@@ -14,6 +14,8 @@ pub struct VertexAttributes {
     pub normal: [f32; 3],
     /// Texture coordinates; (0, 0) is the image's top left corner.
     pub uv: [f32; 2],
+    /// Lightmap coordinates, 0..1 of the surface's page.
+    pub lightmap_uv: [f32; 2],
     /// Encoded vertex colour, RGBA8 with red in the lowest byte.
     pub color: u32,
 }
@@ -25,7 +27,7 @@ pub struct Triangle {
     /// Global vertex indices.
     pub vertices: [u32; 3],
     pub material: u32,
-    /// Surface of the map file.
+    /// Surface of the map file, or [`NONE`] for MD3 models.
     pub surface: u32,
     /// Light-list row for receivers whose own position is in no cluster.
     pub fallback_row: u32,
@@ -41,6 +43,18 @@ pub const MATERIAL_TWO_SIDED_EMISSION: u32 = 4;
 pub const MATERIAL_CLAMP: u32 = 8;
 /// `Material::flags`: the six textures of a sky box are present.
 pub const MATERIAL_SKY_BOX: u32 = 16;
+/// `Material::flags`: the stages decide what is seen; else it is the texture, lit.
+pub const MATERIAL_STAGES: u32 = 32;
+/// `Material::flags`: what is behind shows through.
+pub const MATERIAL_LAYER: u32 = 64;
+/// `Material::flags`: a layer that takes something from the light passing through.
+pub const MATERIAL_FILTER: u32 = 128;
+/// `Material::flags`: drawn seen from behind.
+pub const MATERIAL_BACK: u32 = 256;
+/// `Material::flags`: not drawn seen from the front.
+pub const MATERIAL_NO_FRONT: u32 = 512;
+/// `Material::flags`: emission is that of its stages as the clock has them.
+pub const MATERIAL_MOVING_EMISSION: u32 = 1024;
 
 /// Surface appearance as the tracer sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -54,10 +68,129 @@ pub struct Material {
     pub alpha_offset: f32,
     /// Emitted radiance (luxel units) where the emission texture is 1 (linear), or everywhere without one.
     pub emission: [f32; 3],
+    /// The same as the game would show it, in place of what it lights with.
+    pub shown: [f32; 3],
     /// Texture that modulates emission, or [`NONE`].
     pub emission_texture: u32,
     /// Sky box images, or [`NONE`]: right (+x of the box), left, back, front, up, down in id's naming.
     pub sky: [u32; 6],
+    /// Stages in drawing order.
+    pub first_stage: u32,
+    pub stage_count: u32,
+    /// Stage whose alpha the alpha test looks at, or [`NONE`]: the texture's own.
+    pub alpha_stage: u32,
+    /// Radiance of a sky where its picture is 1 (linear).
+    pub sky_scale: [f32; 3],
+    /// Height of a sky's clouds, units.
+    pub cloud_height: f32,
+}
+
+/// `Wave::function`: see [`crate::assets::shader_script::WaveFunction`].
+pub const WAVE_SINE: u32 = 0;
+pub const WAVE_TRIANGLE: u32 = 1;
+pub const WAVE_SQUARE: u32 = 2;
+pub const WAVE_SAWTOOTH: u32 = 3;
+pub const WAVE_INVERSE_SAWTOOTH: u32 = 4;
+pub const WAVE_NOISE: u32 = 5;
+
+/// `base + amplitude · function(phase + clock · rate)`; rates are [`super::clock`]'s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Wave {
+    pub function: u32,
+    pub base: f32,
+    pub amplitude: f32,
+    /// Periods; of noise, steps over [`super::clock::NOISE_STEPS`].
+    pub phase: f32,
+    pub rate: u32,
+}
+
+/// `TcMod::kind`: `matrix` times the coordinates, plus `offset`.
+pub const TC_AFFINE: u32 = 0;
+/// `TcMod::kind`: plus the fractions of the clock at both `rates`.
+pub const TC_SCROLL: u32 = 1;
+/// `TcMod::kind`: wobbles by the place of the point.
+pub const TC_TURBULENCE: u32 = 2;
+/// `TcMod::kind`: divides by the wave around the middle.
+pub const TC_STRETCH: u32 = 3;
+/// `TcMod::kind`: turns around the middle at the first of `rates`.
+pub const TC_ROTATE: u32 = 4;
+
+/// A change of texture coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TcMod {
+    pub kind: u32,
+    pub rates: [u32; 2],
+    /// Columns.
+    pub matrix: [f32; 4],
+    pub offset: [f32; 2],
+    pub wave: Wave,
+}
+
+/// `Stage::flags`: what it adds is lit.
+pub const STAGE_LIT: u32 = 1;
+/// `Stage::flags`: texture coordinates clamp instead of repeating.
+pub const STAGE_CLAMP: u32 = 2;
+/// `Stage::flags`: what it shows is left to the material's emission.
+pub const STAGE_EMISSION: u32 = 4;
+/// `Stage::flags`: its texture is plain white.
+pub const STAGE_WHITE: u32 = 8;
+
+/// `Stage::rgb_source` and `alpha_source`: `rgb` and `alpha` as they are.
+pub const SOURCE_CONSTANT: u32 = 0;
+/// The wave, held to 0..1.
+pub const SOURCE_WAVE: u32 = 1;
+pub const SOURCE_VERTEX: u32 = 2;
+pub const SOURCE_ONE_MINUS_VERTEX: u32 = 3;
+/// Alpha: highlight of a light at a fixed place.
+pub const SOURCE_SPECULAR: u32 = 4;
+/// Alpha: distance to the viewer over `alpha`.
+pub const SOURCE_PORTAL: u32 = 5;
+
+/// `Stage::tc_gen`
+pub const TC_TEXTURE: u32 = 0;
+pub const TC_LIGHTMAP: u32 = 1;
+pub const TC_ENVIRONMENT: u32 = 2;
+pub const TC_VECTOR: u32 = 3;
+
+/// `Stage::source` and `destination`: factors of the blend function.
+pub const BLEND_ZERO: u32 = 0;
+pub const BLEND_ONE: u32 = 1;
+pub const BLEND_SRC_COLOR: u32 = 2;
+pub const BLEND_ONE_MINUS_SRC_COLOR: u32 = 3;
+pub const BLEND_DST_COLOR: u32 = 4;
+pub const BLEND_ONE_MINUS_DST_COLOR: u32 = 5;
+pub const BLEND_SRC_ALPHA: u32 = 6;
+pub const BLEND_ONE_MINUS_SRC_ALPHA: u32 = 7;
+
+/// Most images of a stage.
+pub const STAGE_TEXTURES: usize = 8;
+
+/// One pass of a material: see [`super::program`].
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Stage {
+    pub textures: [u32; STAGE_TEXTURES],
+    /// Images shown in turn, 1 to 8.
+    pub frames: u32,
+    /// Rounds of all images.
+    pub frame_rate: u32,
+    pub flags: u32,
+    pub source: u32,
+    pub destination: u32,
+    pub rgb_source: u32,
+    pub alpha_source: u32,
+    pub tc_gen: u32,
+    /// Encoded colour.
+    pub rgb: [f32; 3],
+    pub alpha: f32,
+    pub rgb_wave: Wave,
+    pub alpha_wave: Wave,
+    /// Of `tcGen vector`.
+    pub tc_vectors: [[f32; 3]; 2],
+    pub first_mod: u32,
+    pub mod_count: u32,
 }
 
 /// A placed mesh.
@@ -68,12 +201,15 @@ pub struct Instance {
     pub object_to_world: [[f32; 4]; 3],
     /// World to object, three rows of four.
     pub world_to_object: [[f32; 4]; 3],
+    /// Object to world in the frame before.
+    pub old_object_to_world: [[f32; 4]; 3],
     /// First global triangle of the mesh.
     pub first_triangle: u32,
     pub mesh: u32,
     /// 1 where the transform is exactly the identity.
     pub identity: u32,
-    pub padding: u32,
+    /// 1 where the transform may change.
+    pub moves: u32,
 }
 
 /// `Light::kind`: a triangle of an emissive surface.

@@ -156,7 +156,7 @@ impl Report {
                 Visibility::Opaque => "opaque",
                 Visibility::AlphaTested => "alpha_tested",
                 Visibility::Sky => "sky",
-                Visibility::Blended => "blended",
+                Visibility::Layer => "layer",
                 Visibility::Invisible => "invisible",
             })),
             unscripted_materials: scene.material_sources.iter().filter(|m| !m.scripted).count(),

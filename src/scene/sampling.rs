@@ -19,6 +19,8 @@ pub const DIM_PIXEL: u32 = 0;
 pub const DIM_LENS: u32 = 1;
 /// Time within the shutter.
 pub const DIM_SHUTTER: u32 = 2;
+/// Which of a lit layer and what is behind it is shaded, at the i-th layer.
+pub const DIM_LAYER: u32 = 0x4000;
 /// Choice of the i-th random light, 64 of them.
 pub const DIM_LIGHT_PICK: u32 = 16;
 /// Position on the i-th random light, 64 of them.

@@ -1,6 +1,7 @@
 //! Static world and brush models: the map's drawn surfaces as triangles.
 
 use super::material::{MaterialSource, Visibility};
+use super::models::Models;
 use super::records::{Triangle, VertexAttributes};
 use crate::assets::bsp::lumps::{SURFACE_FLARE, SURFACE_PATCH, Surface};
 use crate::assets::bsp::patch::{CURVATURE_BOUND, MeshVertex, tessellate};
@@ -30,7 +31,7 @@ pub struct Mesh {
     pub class: GeometryClass,
     /// First global triangle.
     pub first_triangle: u32,
-    /// Triangles that stop every ray; they come first.
+    /// Triangles that stop every ray without a look at their material; they come first.
     pub opaque_count: u32,
     /// All triangles.
     pub triangle_count: u32,
@@ -44,10 +45,8 @@ pub struct Geometry {
     /// Object-space positions, units.
     pub positions: Vec<[f32; 3]>,
     pub attributes: Vec<VertexAttributes>,
-    /// Lightmap coordinates of each vertex, 0..1 of its surface's page; only the CPU looks at them.
-    pub lightmap_uvs: Vec<[f32; 2]>,
     pub triangles: Vec<Triangle>,
-    /// `meshes[i]` is the map's model i; model 0 is the world.
+    /// `meshes[i]` is the map's model i, model 0 the world; then MD3 models.
     pub meshes: Vec<Mesh>,
     /// Triangles from here on belong to no mesh: emitters that rays do not meet.
     pub untraced_from: u32,
@@ -64,6 +63,10 @@ impl Geometry {
     }
 }
 
+/// Layers at one place, and how far apart they stand, units.
+const LIFT_STEPS: u32 = 8;
+const LIFT_STEP: f32 = 1.0 / 1024.0;
+
 /// Triangles of one surface, wound counter-clockwise seen from the front.
 struct SurfaceMesh {
     surface: u32,
@@ -72,7 +75,7 @@ struct SurfaceMesh {
     degenerate: u32,
 }
 
-fn surface_mesh(bsp: &Bsp, index: u32) -> SurfaceMesh {
+fn surface_mesh(bsp: &Bsp, materials: &[MaterialSource], index: u32) -> SurfaceMesh {
     let s: &Surface = &bsp.surfaces[index as usize];
     let own = &bsp.vertices[s.first_vertex as usize..(s.first_vertex + s.vertex_count) as usize];
     let (vertices, indices) = if s.kind == SURFACE_PATCH {
@@ -88,6 +91,15 @@ fn surface_mesh(bsp: &Bsp, index: u32) -> SurfaceMesh {
             indices.iter().map(|&i| i as u32).collect(),
         )
     };
+    // Coincident layers of the same order are told apart by their number.
+    let lift = match materials[s.shader as usize].lift {
+        lift if lift > 0.0 => lift + (index % LIFT_STEPS) as f32 * LIFT_STEP,
+        _ => 0.0,
+    };
+    let mut vertices: Vec<MeshVertex> = vertices;
+    for v in &mut vertices {
+        v.position += v.normal * lift;
+    }
     let mut out = SurfaceMesh {
         surface: index,
         indices: Vec::with_capacity(indices.len()),
@@ -108,11 +120,11 @@ fn surface_mesh(bsp: &Bsp, index: u32) -> SurfaceMesh {
     out
 }
 
-/// Builds all models of a map. `material_of[shader]` is the material of each shader entry.
-pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool]) -> Geometry {
+/// Builds all models of a map, then the MD3 models that it places.
+pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &Models) -> Geometry {
     let meshes: Vec<SurfaceMesh> = (0..bsp.surfaces.len() as u32)
         .into_par_iter()
-        .map(|i| surface_mesh(bsp, i))
+        .map(|i| surface_mesh(bsp, materials, i))
         .collect();
     let visibility = |s: &SurfaceMesh| materials[bsp.surfaces[s.surface as usize].shader as usize].visibility;
     let mut out = Geometry::default();
@@ -125,8 +137,8 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool]) -> Geometr
             for mesh in &meshes[range.clone()] {
                 let wanted = match visibility(mesh) {
                     Visibility::Opaque | Visibility::Sky => !tested,
-                    Visibility::AlphaTested => tested,
-                    Visibility::Blended | Visibility::Invisible => {
+                    Visibility::AlphaTested | Visibility::Layer => tested,
+                    Visibility::Invisible => {
                         let shader = bsp.surfaces[mesh.surface as usize].shader as usize;
                         if tested && emits[shader] {
                             untraced.push(mesh.surface);
@@ -160,6 +172,7 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool]) -> Geometr
         mesh.triangle_count = triangle_count;
         mesh.bounds = bounds;
     }
+    models.append(&mut out, materials);
     out.untraced_from = out.triangles.len() as u32;
     for surface in untraced {
         out.append(bsp, &meshes[surface as usize]);
@@ -172,11 +185,11 @@ impl Geometry {
         let base = self.positions.len() as u32;
         for v in &mesh.vertices {
             self.positions.push(v.position.into());
-            self.lightmap_uvs.push(v.lightmap_uv.into());
             let color = v.color.to_array().map(|c| (c * 255.0 + 0.5).clamp(0.0, 255.0) as u8);
             self.attributes.push(VertexAttributes {
                 normal: v.normal.into(),
                 uv: v.uv.into(),
+                lightmap_uv: v.lightmap_uv.into(),
                 color: u32::from_le_bytes(color),
             });
         }

@@ -4,8 +4,9 @@
 use glam::Vec3;
 use q3rays::reference::CpuRenderer;
 use q3rays::reference::direct::{RayCounts, SampleAddress, Taken, direct_light, point_sampling, taken_sample};
+use q3rays::reference::layers::{self, see};
 use q3rays::reference::light_sample::{Target, sample_light};
-use q3rays::reference::surface::{SurfaceHit, classify, emission_seen, offset_point, surface_at};
+use q3rays::reference::surface::{SurfaceHit, classify, offset_point};
 use q3rays::render::settings::Settings;
 use q3rays::scene::camera::Camera;
 use q3rays::scene::records::NONE;
@@ -68,7 +69,7 @@ impl Context<'_> {
         (0..3).all(|c| (a[c] - b[c]).abs() <= 1e-3 * b[c].abs() + 1e-4 * self.mean)
     }
 
-    fn radiance(&self, at: &SurfaceHit, direction: Vec3, address: SampleAddress) -> Vec3 {
+    fn radiance(&self, at: &SurfaceHit, seen: &layers::Seen, address: SampleAddress) -> Vec3 {
         let cpu = self.cpu;
         let light = direct_light(
             cpu.scene,
@@ -78,7 +79,7 @@ impl Context<'_> {
             address,
             &mut RayCounts::default(),
         );
-        at.albedo * light + emission_seen(cpu.scene, at, direction)
+        seen.share * (at.albedo * light + seen.emission) + seen.layers
     }
 
     /// Class of one sample of a pixel; `None` where both are the same.
@@ -91,11 +92,11 @@ impl Context<'_> {
         };
         let view = cpu.view(&self.camera, self.size, &self.settings);
         let ray = view.sample(&self.settings, x, y, address);
-        let cast = |direction| cpu.tracer.closest(scene, ray.origin, direction, f64::from(f32::MAX));
-        let hit = cast(ray.direction);
+        let own_seen = see(scene, &cpu.tracer, &self.settings, ray, view.pixel_width, address);
+        let hit = own_seen.surface.map(|(_, hit)| hit);
         let triangle = hit.map_or(NONE, |h| h.triangle);
-        let surface = hit.map(|h| surface_at(scene, &cpu.tracer, &h, ray.direction, view.pixel_width));
-        let own = surface.map_or(Vec3::ZERO, |s| self.radiance(&s, ray.direction, address));
+        let surface = own_seen.surface.map(|(surface, _)| surface);
+        let own = surface.map_or(own_seen.layers, |s| self.radiance(&s, &own_seen, address));
         if self.same(seen.radiance, own) {
             return None;
         }
@@ -113,7 +114,7 @@ impl Context<'_> {
                 row,
                 ..surface
             };
-            if self.same(seen.radiance, self.radiance(&moved, ray.direction, address)) {
+            if self.same(seen.radiance, self.radiance(&moved, &own_seen, address)) {
                 return Some(if row == surface.row {
                     Class::ShadowEdge
                 } else {

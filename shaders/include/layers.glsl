@@ -1,0 +1,97 @@
+// From the eye through layers to the surface that is shaded: src/reference/layers.rs explains it.
+#ifndef LAYERS_GLSL
+#define LAYERS_GLSL
+
+#include "luminance.glsl"
+#include "through.glsl"
+
+const float LEAST_SHARE = 1e-5;
+
+// What a camera ray comes to.
+struct Seen {
+    SurfaceHit surface;
+    // Its triangle is NONE where nothing is shaded.
+    Hit hit;
+    // Share of the surface's light that comes through the layers.
+    vec3 share;
+    // Radiance that the surface emits, before the layers.
+    vec3 emission;
+    // Radiance of the layers.
+    vec3 layers;
+};
+
+Seen see(vec3 origin, vec3 direction, uint address) {
+    Seen out_;
+    out_.hit.triangle = NONE;
+    out_.hit.t = 0.0;
+    out_.share = vec3(1.0);
+    out_.emission = vec3(0.0);
+    out_.layers = vec3(0.0);
+    bool pending = false;
+    SurfaceHit lit;
+    Hit lit_hit;
+    vec3 lit_share = vec3(0.0);
+    float t = 0.0;
+    uint triangle = NONE;
+    uint dimension = DIM_LAYER;
+    [[dont_unroll]] for (uint i = 0; i < MOST_LAYERS; i++) {
+        Hit hit = trace_next(origin, direction, RAY_FAR, t, triangle);
+        if (hit.triangle == NONE || max(out_.share.x, max(out_.share.y, out_.share.z)) <= LEAST_SHARE) {
+            if (pending) {
+                out_.surface = lit;
+                out_.hit = lit_hit;
+                out_.share = lit_share;
+            }
+            return out_;
+        }
+        t = hit.t;
+        triangle = hit.triangle;
+        Material material = FC.materials.at[FC.triangles.at[hit.triangle].material];
+        SurfaceHit s = surface_at(hit, direction, FC.cone);
+        if (!drawn(material, s.front)) continue;
+        bool layer = (material.flags & MATERIAL_LAYER) != 0;
+        if (pending) {
+            if (!layer && hit.t - lit_hit.t <= ON_RECEIVER) {
+                out_.emission = lit.through * emission_seen(s, direction);
+                s.albedo = lit.albedo + lit.through * s.albedo;
+                out_.surface = s;
+                out_.hit = hit;
+                out_.share = lit_share;
+                return out_;
+            }
+            float own = luminance(lit_share * lit.albedo);
+            float rest = luminance(out_.share);
+            float chance = own / max(own + rest, 1.17549435e-38);
+            uint bits = bits2(FC.sequence, random_key(FC.seed, address, dimension), sample_index).x;
+            dimension++;
+            if (FC.choose_layers != 0) {
+                if (unit_float(bits) < chance) {
+                    out_.surface = lit;
+                    out_.hit = lit_hit;
+                    out_.share = lit_share / chance;
+                    return out_;
+                }
+                out_.share /= 1.0 - chance;
+            }
+            pending = false;
+        }
+        vec3 emission = emission_seen(s, direction);
+        if (!layer) {
+            out_.surface = s;
+            out_.hit = hit;
+            out_.emission = emission;
+            return out_;
+        }
+        out_.layers += out_.share * emission;
+        if (s.albedo != vec3(0.0)) {
+            pending = true;
+            lit = s;
+            lit_hit = hit;
+            lit_share = out_.share;
+        }
+        out_.share *= s.through;
+    }
+    return out_;
+}
+
+#endif

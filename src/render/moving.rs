@@ -1,0 +1,104 @@
+//! Instances that move with the scene's clock: their records, the tree over them and the top level, made anew for each frame
+//! of a view. A few hundred bytes an instance; nothing where nothing moves.
+
+use super::bvh_upload::instance_tree;
+use super::frame_constants::FrameConstants;
+use super::scene_gpu::{SceneGpu, placed_instances};
+use crate::gpu::acceleration::TopLevel;
+use crate::gpu::{Access, Buffer, Commands, DescriptorSets, GpuError, MemoryKind, Tracker, Use, Write};
+use crate::scene::clock::Clock;
+use crate::scene::records::Instance;
+use ash::vk;
+
+/// A view's own instances.
+pub struct Moving {
+    /// By frame in flight.
+    instances: Vec<Buffer>,
+    nodes: Vec<Buffer>,
+    top: Option<(TopLevel, DescriptorSets)>,
+    before: Option<Clock>,
+}
+
+impl Moving {
+    /// Makes room for a scene's instances.
+    ///
+    /// # Errors
+    /// [`GpuError`], out of memory above all.
+    pub fn new(scene: &SceneGpu, frames_in_flight: usize) -> Result<Self, GpuError> {
+        let count = scene.placements.len().max(1);
+        let buffers = |name: &str, bytes: usize| {
+            (0..frames_in_flight)
+                .map(|_| {
+                    let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+                    Buffer::new(&scene.device, name, bytes as u64, usage, MemoryKind::Upload)
+                })
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let top = match &scene.driver {
+            Some(_) => {
+                let top = TopLevel::new(&scene.device, "moving top level", count as u32, frames_in_flight)?;
+                let sets = scene.texture_sets()?;
+                sets.write(0, &[Write::acceleration_structure(0, &top)])?;
+                Some((top, sets))
+            }
+            None => None,
+        };
+        Ok(Self {
+            instances: buffers("moving instances", count * size_of::<Instance>())?,
+            nodes: buffers("moving instance nodes", count * size_of::<[f32; 16]>())?,
+            top,
+            before: None,
+        })
+    }
+
+    /// Writes a frame's instances and tells its constants.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn advance(
+        &mut self,
+        cmd: &Commands<'_>,
+        tracker: &mut Tracker,
+        scene: &SceneGpu,
+        slot: usize,
+        clock: Clock,
+        constants: FrameConstants,
+    ) -> Result<FrameConstants, GpuError> {
+        let before = self.before.replace(clock).unwrap_or(clock);
+        let records: Vec<Instance> = scene
+            .placements
+            .iter()
+            .map(|p| p.record(&scene.meshes, clock, before))
+            .collect();
+        let tree =
+            instance_tree(&scene.meshes, &records, &scene.name).map_err(|e| GpuError::InvalidInput(e.to_string()))?;
+        let count = if tree.is_some() {
+            records.len()
+        } else {
+            records.len().min(1)
+        } as u32;
+        let tree = tree.unwrap_or_default();
+        self.instances[slot].write(0, &records)?;
+        if !tree.nodes.is_empty() {
+            self.nodes[slot].write(0, &tree.nodes)?;
+        }
+        if let (Some((top, _)), Some(driver)) = (&mut self.top, &scene.driver) {
+            tracker.pass(cmd, &[Use::resource(top.id(), Access::BuildWrite)])?;
+            top.record_build(cmd, &placed_instances(driver, &records), slot)?;
+            tracker.pass(cmd, &[Use::resource(top.id(), Access::Trace)])?;
+        }
+        Ok(FrameConstants {
+            instances: self.instances[slot].address(),
+            instance_nodes: self.nodes[slot].address(),
+            instance_count: count,
+            instance_root: tree.root,
+            moving: u32::from(before != clock),
+            ..constants
+        })
+    }
+
+    /// Set 0 of the frame, where the driver's structures are of this view.
+    pub fn sets(&self) -> Option<&DescriptorSets> {
+        self.top.as_ref().map(|(_, sets)| sets)
+    }
+}
