@@ -249,7 +249,7 @@ mod tests {
     use crate::assets::entities::parse;
 
     fn motion(text: &str) -> Motion {
-        let (entities, _) = parse(text);
+        let (entities, _) = parse(text.as_bytes());
         Motion::of_brush_model(&entities[0], &entities, Vec3::splat(-16.0), Vec3::splat(16.0))
     }
 
