@@ -10,17 +10,22 @@
 #include "camera.glsl"
 #include "gbuffer.glsl"
 #include "layers.glsl"
+#include "deform.glsl"
 #include "guide.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Where a point of a moving instance was in the frame before.
+// Where a point was in the frame before.
 vec3 old_position_of(Instance i, Hit hit) {
     Triangle t = FC.triangles.at[hit.triangle];
+    vec3 p[3];
+    for (uint k = 0; k < 3; k++) {
+        uint vertex = t.vertices[k];
+        p[k] = vertex >= FC.first_dynamic_vertex ? deformed(vertex, FC.old_clock, FC.old_eye).position
+                                                 : FC.positions.at[vertex];
+    }
     vec2 b = hit.barycentrics;
-    vec3 p = FC.positions.at[t.vertices[0]] * (1.0 - b.x - b.y) + FC.positions.at[t.vertices[1]] * b.x
-           + FC.positions.at[t.vertices[2]] * b.y;
-    vec4 q = vec4(p, 1.0);
+    vec4 q = vec4(p[0] * (1.0 - b.x - b.y) + p[1] * b.x + p[2] * b.y, 1.0);
     return vec3(dot(i.old_object_to_world[0], q), dot(i.old_object_to_world[1], q), dot(i.old_object_to_world[2], q));
 }
 
@@ -56,7 +61,8 @@ void main() {
     vec2 motion = sky ? motion_of_direction(direction) : motion_of(s.position);
     vec3 old_position = s.position;
     Instance instance = FC.instances.at[hit.instance];
-    if (instance.moves != 0) {
+    bool dynamic = FC.triangles.at[hit.triangle].vertices[0] >= FC.first_dynamic_vertex;
+    if (instance.moves != 0 || dynamic) {
         old_position = old_position_of(instance, hit);
         motion = motion_between(s.position - FC.eye, old_position - FC.old_eye);
     }

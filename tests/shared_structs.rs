@@ -6,8 +6,8 @@ use q3rays::render::frame_constants::{FrameConstants, Push};
 use q3rays::render::reservoirs::Reservoir;
 use q3rays::render::strata::Stratum;
 use q3rays::scene::records::{
-    AmbientCube, BspNode, CellEntry, Instance, Light, LightCell, LightNode, LightRow, LightRun, Material, Stage, TcMod,
-    TextureInfo, Triangle, VertexAttributes, Wave,
+    AmbientCube, BspNode, CellEntry, Deform, DynamicTriangle, Instance, Light, LightCell, LightNode, LightRow,
+    LightRun, Material, RestVertex, Stage, TcMod, TextureInfo, Triangle, VertexAttributes, Wave,
 };
 use std::collections::{BTreeMap, HashMap};
 use std::mem::offset_of;
@@ -117,7 +117,9 @@ fn records() -> Vec<Record> {
             stage_count,
             alpha_stage,
             sky_scale,
-            cloud_height
+            cloud_height,
+            first_deform,
+            deform_count
         }),
         record!(Wave {
             function,
@@ -126,6 +128,21 @@ fn records() -> Vec<Record> {
             phase,
             rate
         }),
+        record!(Deform {
+            kind,
+            rate,
+            a,
+            b,
+            direction,
+            wave
+        }),
+        record!(RestVertex {
+            position,
+            normal,
+            quad,
+            material
+        }),
+        record!(DynamicTriangle { triangle, cwbvh, bvh2 }),
         record!(TcMod {
             kind,
             rates,
@@ -251,6 +268,9 @@ fn records() -> Vec<Record> {
             materials,
             stages,
             tc_mods,
+            deforms,
+            rest_vertices,
+            dynamic_triangles,
             instances,
             lights,
             bsp_nodes,
@@ -334,7 +354,11 @@ fn records() -> Vec<Record> {
             choose_layers,
             light_filters,
             shown_emission,
-            moving
+            moving,
+            old_clock,
+            first_dynamic_vertex,
+            dynamic_triangles_count,
+            padding
         }),
         record!(Push {
             frame,

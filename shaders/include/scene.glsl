@@ -45,6 +45,8 @@ struct Material {
     uint alpha_stage;
     vec3 sky_scale;
     float cloud_height;
+    uint first_deform;
+    uint deform_count;
 };
 
 const uint WAVE_SINE = 0;
@@ -52,6 +54,7 @@ const uint WAVE_TRIANGLE = 1;
 const uint WAVE_SQUARE = 2;
 const uint WAVE_SAWTOOTH = 3;
 const uint WAVE_INVERSE_SAWTOOTH = 4;
+const uint WAVE_NOISE = 5;
 
 struct Wave {
     uint function;
@@ -59,6 +62,34 @@ struct Wave {
     float amplitude;
     float phase;
     uint rate;
+};
+
+const uint DEFORM_WAVE = 0;
+const uint DEFORM_NORMAL = 1;
+const uint DEFORM_BULGE = 2;
+const uint DEFORM_MOVE = 3;
+const uint DEFORM_AUTOSPRITE = 4;
+
+struct Deform {
+    uint kind;
+    uint rate;
+    float a;
+    float b;
+    vec3 direction;
+    Wave wave;
+};
+
+struct RestVertex {
+    vec3 position;
+    vec3 normal;
+    uint quad;
+    uint material;
+};
+
+struct DynamicTriangle {
+    uint triangle;
+    uint cwbvh;
+    uint bvh2;
 };
 
 const uint TC_SCROLL = 1;
@@ -259,6 +290,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Pos
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Attributes { VertexAttributes at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Triangles { Triangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Materials { Material at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Deforms { Deform at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RestVertices { RestVertex at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicTriangles { DynamicTriangle at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Stages { Stage at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TcMods { TcMod at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };
@@ -288,6 +322,9 @@ struct FrameConstants {
     Materials materials;
     Stages stages;
     TcMods tc_mods;
+    Deforms deforms;
+    RestVertices rest_vertices;
+    DynamicTriangles dynamic_triangles;
     Instances instances;
     Lights lights;
     BspNodes bsp_nodes;
@@ -372,6 +409,10 @@ struct FrameConstants {
     uint light_filters;
     uint shown_emission;
     uint moving;
+    uint old_clock;
+    uint first_dynamic_vertex;
+    uint dynamic_triangles_count;
+    uint padding;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

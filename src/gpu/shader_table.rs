@@ -35,6 +35,7 @@ macro_rules! shader_table {
 }
 
 shader_table! {
+    "deform": "deform.comp" [];
     "primary_bvh": "primary.comp" ["TRACE_BVH2" = "1"];
     "primary_rayquery": "primary.comp" ["TRACE_RAYQUERY" = "1"];
     "direct_bvh": "direct.comp" [];

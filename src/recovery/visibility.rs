@@ -23,7 +23,10 @@ impl<'a> Occluders<'a> {
     /// Builds the trees.
     pub fn new(scene: &'a Scene) -> Self {
         let mut tracer = Tracer::new(scene);
-        tracer.instances.retain(|i| i.mesh == 0);
+        let dynamic = scene.geometry.dynamic.mesh;
+        tracer
+            .instances
+            .retain(|i| i.mesh == 0 || (dynamic != 0 && i.mesh == dynamic));
         Self {
             scene,
             filtered: compiled_with(scene, "-filter"),

@@ -73,7 +73,7 @@ fn coordinates(scene: &Scene, s: &Stage, p: &Point, clock: Clock) -> (Vec2, f32)
         _ => p.uv,
     };
     let mut density = 1.0;
-    for m in &scene.tc_mods[s.first_mod as usize..(s.first_mod + s.mod_count) as usize] {
+    for m in &scene.tables.tc_mods[s.first_mod as usize..(s.first_mod + s.mod_count) as usize] {
         match m.kind {
             TC_SCROLL => uv += Vec2::new(clock.fraction(m.rates[0]), clock.fraction(m.rates[1])),
             TC_TURBULENCE => {
@@ -158,7 +158,7 @@ fn stage_colour(scene: &Scene, s: &Stage, p: &Point, clock: Clock) -> Vec4 {
 }
 
 fn stages<'a>(scene: &'a Scene, material: &Material) -> &'a [Stage] {
-    &scene.stages[material.first_stage as usize..(material.first_stage + material.stage_count) as usize]
+    &scene.tables.stages[material.first_stage as usize..(material.first_stage + material.stage_count) as usize]
 }
 
 /// What the material does with light at a point.
@@ -176,7 +176,7 @@ pub fn tested_alpha(scene: &Scene, material: &Material, p: &Point, clock: Clock)
         let texture = &scene.textures[material.texture as usize];
         return sample(texture, p.uv, 0.0, material.flags & MATERIAL_CLAMP != 0).w;
     }
-    let s = &scene.stages[material.alpha_stage as usize];
+    let s = &scene.tables.stages[material.alpha_stage as usize];
     texel(scene, s, p, clock, false).w * alpha_factor(s, p, clock)
 }
 

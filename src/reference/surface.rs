@@ -111,16 +111,13 @@ struct Place {
 
 fn place(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3) -> Place {
     let instance = &tracer.instances[hit.instance as usize];
-    let triangle = scene.geometry.triangles[hit.triangle as usize];
-    let corners = scene.geometry.corners(hit.triangle);
+    let corners = tracer.corners(scene, hit.triangle);
     let [b1, b2] = hit.barycentrics.map(|b| b as f32);
     let b0 = 1.0 - b1 - b2;
     let position = point_to_world(instance, corners[0] * b0 + corners[1] * b1 + corners[2] * b2);
     let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let mut geometric = normal_to_world(instance, cross).normalize();
-    let normals = triangle
-        .vertices
-        .map(|v| Vec3::from(scene.geometry.attributes[v as usize].normal));
+    let normals = tracer.normals(scene, hit.triangle);
     let interpolated = normal_to_world(instance, normals[0] * b0 + normals[1] * b1 + normals[2] * b2);
     let mut shading = interpolated.normalize_or(geometric);
     if shading.dot(geometric) < 0.0 {
@@ -143,7 +140,7 @@ fn colour(code: u32) -> Vec4 {
     Vec4::from_array(code.to_le_bytes().map(|c| f32::from(c) / 255.0))
 }
 
-fn stage_point(scene: &Scene, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Point {
+fn stage_point(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Point {
     let triangle = scene.geometry.triangles[hit.triangle as usize];
     let attributes = triangle.vertices.map(|v| scene.geometry.attributes[v as usize]);
     let [b1, b2] = hit.barycentrics.map(|b| b as f32);
@@ -156,7 +153,7 @@ fn stage_point(scene: &Scene, place: &Place, hit: &Hit, direction: Vec3, cone: f
     let lod = if cone > 0.0 {
         let cosine = place.geometric.dot(direction) / length;
         texture_lod(
-            scene.geometry.corners(hit.triangle),
+            tracer.corners(scene, hit.triangle),
             uvs,
             Vec2::ONE,
             cone * distance,
@@ -179,7 +176,14 @@ fn stage_point(scene: &Scene, place: &Place, hit: &Hit, direction: Vec3, cone: f
 
 /// What stages look at in a hit, textures at full resolution.
 pub fn point_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3) -> Point {
-    stage_point(scene, &place(scene, tracer, hit, direction), hit, direction, 0.0)
+    stage_point(
+        scene,
+        tracer,
+        &place(scene, tracer, hit, direction),
+        hit,
+        direction,
+        0.0,
+    )
 }
 
 fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Shade {
@@ -193,7 +197,7 @@ fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction:
         };
     }
     if material.flags & MATERIAL_STAGES != 0 {
-        let point = stage_point(scene, place, hit, direction, cone);
+        let point = stage_point(scene, tracer, place, hit, direction, cone);
         return shade(scene, material, &point, tracer.clock);
     }
     let texture = &scene.textures[material.texture as usize];
@@ -203,7 +207,7 @@ fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction:
             .map(|v| Vec2::from(scene.geometry.attributes[v as usize].uv));
         let length = direction.length();
         texture_lod(
-            scene.geometry.corners(hit.triangle),
+            tracer.corners(scene, hit.triangle),
             uvs,
             Vec2::new(texture.width as f32, texture.height as f32),
             cone * hit.t as f32 * length,

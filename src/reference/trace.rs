@@ -5,6 +5,7 @@ use super::surface::point_at;
 use crate::scene::Scene;
 use crate::scene::bvh::build_cwbvhs;
 use crate::scene::clock::Clock;
+use crate::scene::dynamic_geometry::{self, Moved};
 use crate::scene::entity_geometry::Placement;
 use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material};
 use glam::{DVec3, Vec3};
@@ -37,6 +38,8 @@ pub struct Tracer {
     trees: Arc<Vec<CwBvh>>,
     pub instances: Vec<Instance>,
     pub clock: Clock,
+    /// Dynamic vertices at the moment.
+    moved: Vec<Moved>,
 }
 
 /// What a ray looks for.
@@ -47,6 +50,10 @@ enum Wanted<'a> {
     Blocker(&'a Cell<bool>),
     /// The nearest of all, layers too, that comes after a hit.
     Next(Option<Hit>),
+}
+
+fn moved(scene: &Scene, clock: Clock, eye: Vec3) -> Vec<Moved> {
+    dynamic_geometry::all(&scene.geometry, &scene.materials, &scene.tables.deforms, clock, eye)
 }
 
 fn instances(scene: &Scene, clock: Clock) -> Vec<Instance> {
@@ -105,16 +112,41 @@ impl Tracer {
             trees: Arc::new(build_cwbvhs(&scene.geometry)),
             instances: instances(scene, Clock::default()),
             clock: Clock::default(),
+            moved: moved(scene, Clock::default(), Vec3::ZERO),
         }
     }
 
-    /// The same scene at another moment.
-    pub fn at(&self, scene: &Scene, clock: Clock) -> Self {
+    /// The same scene at another moment, seen from `eye`.
+    pub fn at(&self, scene: &Scene, clock: Clock, eye: Vec3) -> Self {
         Self {
             trees: self.trees.clone(),
             instances: instances(scene, clock),
             clock,
+            moved: moved(scene, clock, eye),
         }
+    }
+
+    fn vertex(&self, scene: &Scene, vertex: u32) -> Option<&Moved> {
+        let first = scene.geometry.dynamic.vertices.start;
+        vertex.checked_sub(first).and_then(|i| self.moved.get(i as usize))
+    }
+
+    /// Corner positions of a triangle at the moment, object space.
+    pub fn corners(&self, scene: &Scene, triangle: u32) -> [Vec3; 3] {
+        let vertices = scene.geometry.triangles[triangle as usize].vertices;
+        vertices.map(|v| {
+            let still = || Vec3::from(scene.geometry.positions[v as usize]);
+            self.vertex(scene, v).map_or_else(still, |m| m.position)
+        })
+    }
+
+    /// Normals of a triangle's vertices at the moment, object space.
+    pub fn normals(&self, scene: &Scene, triangle: u32) -> [Vec3; 3] {
+        let vertices = scene.geometry.triangles[triangle as usize].vertices;
+        vertices.map(|v| {
+            let still = || Vec3::from(scene.geometry.attributes[v as usize].normal);
+            self.vertex(scene, v).map_or_else(still, |m| m.normal)
+        })
     }
 
     /// Looks for hits with 0 < t < `t_max`.
@@ -142,7 +174,7 @@ impl Tracer {
             let mut node_hit = RayHit::none();
             while tree.ray_traverse_dynamic(&mut state, &mut node_hit, |_, primitive| {
                 let triangle = mesh.first_triangle + tree.primitive_indices[primitive];
-                let Some((t, barycentrics)) = intersect(od, dd, scene.geometry.corners(triangle)) else {
+                let Some((t, barycentrics)) = intersect(od, dd, self.corners(scene, triangle)) else {
                     return f32::INFINITY;
                 };
                 let nearer = t < limit || best.is_some_and(|b| t == limit && triangle < b.triangle);

@@ -1,7 +1,7 @@
 //! Trees in the shaders' layouts: see `shaders/include/trace_cwbvh.glsl` and `trace_bvh2.glsl`.
 
 use crate::scene::bvh::{BvhQuality, mesh_triangles};
-use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED, MATERIAL_LAYER};
+use crate::scene::records::{DynamicTriangle, Instance, MATERIAL_ALPHA_TESTED, MATERIAL_LAYER};
 use crate::scene::static_geometry::{Geometry, Mesh};
 use crate::scene::{Scene, bvh};
 use bytemuck::{Pod, Zeroable};
@@ -9,7 +9,10 @@ use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::{build_bvh2, build_bvh2_from_tris};
-use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
+use obvhs::cwbvh::{
+    CwBvh,
+    builder::{build_cwbvh, build_cwbvh_from_tris},
+};
 use rayon::prelude::*;
 use std::time::Duration;
 use thiserror::Error;
@@ -65,6 +68,8 @@ pub struct MeshTrees {
     /// (min, reference) (max, 0) of both children.
     pub bvh2_nodes: Vec<[f32; 16]>,
     pub bvh2_triangles: Vec<[f32; 12]>,
+    /// Where the triangles of the dynamic mesh are in both.
+    pub dynamic: Vec<DynamicTriangle>,
 }
 
 struct BuiltMesh {
@@ -129,14 +134,21 @@ fn pack_pairs(tree: &Bvh2, leaf: impl Fn(u32, u32) -> u32) -> (Vec<[f32; 16]>, u
     (out, 0, deepest)
 }
 
-fn build_mesh(geometry: &Geometry, mesh: &Mesh, quality: BvhQuality) -> BuiltMesh {
+fn build_mesh(geometry: &Geometry, index: usize, mesh: &Mesh, quality: BvhQuality) -> BuiltMesh {
     let triangles = mesh_triangles(geometry, mesh);
     let params = bvh::build_params(mesh.triangle_count, quality);
     let mut time = Duration::default();
-    let cwbvh = build_cwbvh_from_tris(&triangles, params, &mut time);
+    let boxes = bvh::swept_boxes(geometry, index);
+    let cwbvh = match &boxes {
+        Some(boxes) => build_cwbvh(boxes, params, &mut time),
+        None => build_cwbvh_from_tris(&triangles, params, &mut time),
+    };
     let mut params2 = params;
     params2.max_prims_per_leaf = params2.max_prims_per_leaf.min(BVH2_LEAF_SIZE);
-    let bvh2 = build_bvh2_from_tris(&triangles, params2, &mut time);
+    let bvh2 = match &boxes {
+        Some(boxes) => build_bvh2(boxes, params2, &mut time),
+        None => build_bvh2_from_tris(&triangles, params2, &mut time),
+    };
     let (nodes2, root2, depth2) = if triangles.is_empty() {
         (Vec::new(), BVH2_LEAF, 0)
     } else {
@@ -162,7 +174,8 @@ impl MeshTrees {
         let built: Vec<BuiltMesh> = geometry
             .meshes
             .par_iter()
-            .map(|mesh| build_mesh(geometry, mesh, quality))
+            .enumerate()
+            .map(|(index, mesh)| build_mesh(geometry, index, mesh, quality))
             .collect();
         let mut out = Self::default();
         for (index, (mesh, b)) in geometry.meshes.iter().zip(built).enumerate() {
@@ -193,6 +206,21 @@ impl MeshTrees {
                 // A node without children, and one triangle that nothing hits, keep the walks free of special cases.
                 out.cwbvh_nodes.push([0; 20]);
                 out.bvh2_triangles.push([0.0; 12]);
+            }
+            if !geometry.dynamic.rest.is_empty() && index == geometry.dynamic.mesh as usize {
+                let mut places = vec![[0u32; 2]; mesh.triangle_count as usize];
+                for (at, i) in b.cwbvh.primitive_indices.iter().enumerate() {
+                    places[*i as usize][0] = (out.cwbvh_triangles.len() + at) as u32;
+                }
+                for (at, i) in b.order2.iter().enumerate() {
+                    places[*i as usize][1] = (out.bvh2_triangles.len() + at) as u32;
+                }
+                let place = |(i, [cwbvh, bvh2]): (u32, [u32; 2])| DynamicTriangle {
+                    triangle: mesh.first_triangle + i,
+                    cwbvh,
+                    bvh2,
+                };
+                out.dynamic = (0u32..).zip(places).map(place).collect();
             }
             let pack = |i: &u32| packed_triangle(scene, mesh.first_triangle + i);
             out.cwbvh_triangles.extend(b.cwbvh.primitive_indices.iter().map(pack));

@@ -2,6 +2,7 @@
 
 use super::atrous::Atrous;
 use super::composite::Composite;
+use super::deform::Deform;
 use super::direct::Direct;
 use super::exposure::Exposure;
 use super::focus::Focus;
@@ -61,6 +62,7 @@ impl FrameInput {
 
 /// All passes, for one backend. Makes frames of any scene and view.
 pub struct FrameRenderer {
+    deform: Deform,
     primary: Primary,
     focus: Focus,
     direct: Direct,
@@ -91,6 +93,7 @@ impl FrameRenderer {
             cache,
         };
         Ok(Self {
+            deform: Deform::new(&context)?,
             primary: Primary::new(&context)?,
             focus: Focus::new(&context)?,
             direct: Direct::new(&context)?,
@@ -132,7 +135,7 @@ impl FrameRenderer {
             };
             let moving = view.moving.insert(moving);
             let clock = input.settings.clock;
-            constants = moving.advance(cmd, &mut view.tracker, scene, slot, clock, constants)?;
+            constants = moving.advance(scene, slot, clock, constants)?;
         }
         let reuses = input.reuses();
         if reuses {
@@ -141,6 +144,27 @@ impl FrameRenderer {
             reservoirs.forget();
         }
         view.constants[slot].write(0, &[constants])?;
+        let push = Push {
+            frame: view.constants[slot].address(),
+            sample_index: input.sample_index,
+            accumulated: input.accumulated,
+            level: 0,
+            padding: 0,
+        };
+        if scene.dynamic_triangles_count > 0 {
+            self.deform.record(&mut Recorder {
+                cmd,
+                tracker: &mut view.tracker,
+                timestamps,
+                scene,
+                scene_sets: &scene.sets,
+                gbuffer: &view.gbuffer,
+                push,
+            })?;
+        }
+        if let Some(moving) = &mut view.moving {
+            moving.build_top(cmd, &mut view.tracker, slot)?;
+        }
         let mut r = Recorder {
             cmd,
             tracker: &mut view.tracker,
@@ -148,13 +172,7 @@ impl FrameRenderer {
             scene,
             scene_sets: view.moving.as_ref().and_then(Moving::sets).unwrap_or(&scene.sets),
             gbuffer: &view.gbuffer,
-            push: Push {
-                frame: view.constants[slot].address(),
-                sample_index: input.sample_index,
-                accumulated: input.accumulated,
-                level: 0,
-                padding: 0,
-            },
+            push,
         };
         if input.settings.aperture > 0.0 && input.settings.focus_distance <= 0.0 {
             self.focus.record(&mut r, &view.focus[slot])?;

@@ -13,6 +13,9 @@ pub struct FrameConstants {
     pub materials: u64,
     pub stages: u64,
     pub tc_mods: u64,
+    pub deforms: u64,
+    pub rest_vertices: u64,
+    pub dynamic_triangles: u64,
     pub instances: u64,
     pub lights: u64,
     pub bsp_nodes: u64,
@@ -128,6 +131,11 @@ pub struct FrameConstants {
     pub shown_emission: u32,
     /// Instances move: where a surface was is in the image `motion`.
     pub moving: u32,
+    /// Time of the frame before.
+    pub old_clock: u32,
+    pub first_dynamic_vertex: u32,
+    pub dynamic_triangles_count: u32,
+    pub padding: u32,
 }
 
 /// Push constants of every pass.

@@ -100,6 +100,7 @@ impl FrameHistory {
             old_half_height: view.half_height,
             old_right: view.right,
             old_up: view.up,
+            old_clock: view.clock,
             jitter,
             old_jitter: if good { view.jitter } else { jitter },
             history: u32::from(good),

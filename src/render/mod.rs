@@ -4,6 +4,7 @@ pub mod atrous;
 pub mod backend;
 pub mod bvh_upload;
 pub mod composite;
+pub mod deform;
 pub mod direct;
 pub mod exposure;
 pub mod film;

@@ -4,7 +4,7 @@
 use super::bvh_upload::instance_tree;
 use super::frame_constants::FrameConstants;
 use super::scene_gpu::{SceneGpu, placed_instances};
-use crate::gpu::acceleration::TopLevel;
+use crate::gpu::acceleration::{TopInstance, TopLevel};
 use crate::gpu::{Access, Buffer, Commands, DescriptorSets, GpuError, MemoryKind, Tracker, Use, Write};
 use crate::scene::clock::Clock;
 use crate::scene::records::Instance;
@@ -16,6 +16,8 @@ pub struct Moving {
     instances: Vec<Buffer>,
     nodes: Vec<Buffer>,
     top: Option<(TopLevel, DescriptorSets)>,
+    /// What the frame's top level is made of.
+    placed: Vec<TopInstance>,
     before: Option<Clock>,
 }
 
@@ -47,6 +49,7 @@ impl Moving {
             instances: buffers("moving instances", count * size_of::<Instance>())?,
             nodes: buffers("moving instance nodes", count * size_of::<[f32; 16]>())?,
             top,
+            placed: Vec::new(),
             before: None,
         })
     }
@@ -57,8 +60,6 @@ impl Moving {
     /// [`GpuError`] of the device.
     pub fn advance(
         &mut self,
-        cmd: &Commands<'_>,
-        tracker: &mut Tracker,
         scene: &SceneGpu,
         slot: usize,
         clock: Clock,
@@ -82,10 +83,8 @@ impl Moving {
         if !tree.nodes.is_empty() {
             self.nodes[slot].write(0, &tree.nodes)?;
         }
-        if let (Some((top, _)), Some(driver)) = (&mut self.top, &scene.driver) {
-            tracker.pass(cmd, &[Use::resource(top.id(), Access::BuildWrite)])?;
-            top.record_build(cmd, &placed_instances(driver, &records), slot)?;
-            tracker.pass(cmd, &[Use::resource(top.id(), Access::Trace)])?;
+        if let Some(driver) = &scene.driver {
+            self.placed = placed_instances(driver, &records);
         }
         Ok(FrameConstants {
             instances: self.instances[slot].address(),
@@ -95,6 +94,17 @@ impl Moving {
             moving: u32::from(before != clock),
             ..constants
         })
+    }
+
+    /// Records the build of the frame's top level, where there is one.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn build_top(&mut self, cmd: &Commands<'_>, tracker: &mut Tracker, slot: usize) -> Result<(), GpuError> {
+        let Some((top, _)) = &mut self.top else { return Ok(()) };
+        tracker.pass(cmd, &[Use::resource(top.id(), Access::BuildWrite)])?;
+        top.record_build(cmd, &self.placed, slot)?;
+        tracker.pass(cmd, &[Use::resource(top.id(), Access::Trace)])
     }
 
     /// Set 0 of the frame, where the driver's structures are of this view.

@@ -6,7 +6,7 @@ use super::frame_constants::FrameConstants;
 use super::history::Moving;
 use crate::assets::image::SRGB_TO_LINEAR;
 use crate::gpu::acceleration::{
-    BottomDesc, BottomLevel, BuildPreference, BuildStatistics, TopInstance, TopLevel, TriangleGeometry,
+    BottomDesc, BottomLevel, BuildPreference, BuildStatistics, Refit, Scratch, TopInstance, TopLevel, TriangleGeometry,
 };
 use crate::gpu::{
     Binding, BindingKind, Buffer, DescriptorLayout, DescriptorSets, Device, GpuError, Image, ImageDesc, MemoryKind,
@@ -70,6 +70,22 @@ pub struct DriverStructures {
     bottom: Vec<Option<BottomLevel>>,
     pub top: TopLevel,
     pub statistics: BuildStatistics,
+    /// The dynamic mesh, where there is one.
+    pub refit: Option<DynamicRefit>,
+}
+
+/// What refits the driver's structure over the dynamic mesh.
+pub struct DynamicRefit {
+    pub mesh: u32,
+    pub geometries: Vec<TriangleGeometry>,
+    pub scratch: Scratch,
+}
+
+impl DriverStructures {
+    /// The bottom level of a mesh.
+    pub fn bottom(&self, mesh: u32) -> Option<&BottomLevel> {
+        self.bottom.get(mesh as usize)?.as_ref()
+    }
 }
 
 /// Everything of a scene that shaders read.
@@ -82,6 +98,11 @@ pub struct SceneGpu {
     pub materials: Buffer,
     pub stages: Buffer,
     pub tc_mods: Buffer,
+    pub deforms: Buffer,
+    pub rest_vertices: Buffer,
+    pub dynamic_triangles: Buffer,
+    pub dynamic_triangles_count: u32,
+    first_dynamic_vertex: u32,
     /// The scene has layers that tint light.
     pub light_filters: bool,
     pub moving: Moving,
@@ -192,8 +213,11 @@ impl SceneGpu {
         let attributes = buffer!("attributes", &g.attributes, none);
         let triangles = buffer!("triangles", &g.triangles, none);
         let materials = buffer!("materials", &scene.materials, none);
-        let stages = buffer!("stages", &scene.stages, none);
-        let tc_mods = buffer!("texture coordinate changes", &scene.tc_mods, none);
+        let stages = buffer!("stages", &scene.tables.stages, none);
+        let tc_mods = buffer!("texture coordinate changes", &scene.tables.tc_mods, none);
+        let deforms = buffer!("deforms", &scene.tables.deforms, none);
+        let rest_vertices = buffer!("rest vertices", &g.dynamic.rest, none);
+        let dynamic_triangles = buffer!("dynamic triangles", &trees.dynamic, none);
         let instance_records = buffer!("instances", &instances, none);
         let lights = buffer!("lights", &scene.lights.lights, none);
         let light_nodes = buffer!("light nodes", &scene.lights.tree.nodes, none);
@@ -272,7 +296,8 @@ impl SceneGpu {
                 .ok_or_else(|| GpuError::InvalidInput("a scene buffer is used twice".into()))
         };
         let index_buffer = take(index_buffer)?;
-        let driver = driver.map(|(bottom, top, statistics)| DriverStructures {
+        let driver = driver.map(|(bottom, top, statistics, refit)| DriverStructures {
+            refit,
             _index_buffer: index_buffer,
             bottom,
             top,
@@ -289,10 +314,15 @@ impl SceneGpu {
             materials: take(materials)?,
             stages: take(stages)?,
             tc_mods: take(tc_mods)?,
+            deforms: take(deforms)?,
+            rest_vertices: take(rest_vertices)?,
+            dynamic_triangles: take(dynamic_triangles)?,
+            dynamic_triangles_count: trees.dynamic.len() as u32,
+            first_dynamic_vertex: g.dynamic.vertices.start,
             moving: Moving {
                 picture: scene.material_sources.iter().any(|m| m.program.animated),
                 lights: scene.material_sources.iter().any(|m| m.program.moving_emission),
-                geometry: scene.placements.iter().any(|p| p.motion.moves()),
+                geometry: scene.placements.iter().any(|p| p.motion.moves()) || !trees.dynamic.is_empty(),
             },
             name: scene.name.clone(),
             placements: scene.placements.clone(),
@@ -384,6 +414,15 @@ impl SceneGpu {
             materials: self.materials.address(),
             stages: self.stages.address(),
             tc_mods: self.tc_mods.address(),
+            deforms: self.deforms.address(),
+            rest_vertices: self.rest_vertices.address(),
+            dynamic_triangles: self.dynamic_triangles.address(),
+            dynamic_triangles_count: self.dynamic_triangles_count,
+            first_dynamic_vertex: if self.dynamic_triangles_count > 0 {
+                self.first_dynamic_vertex
+            } else {
+                NONE
+            },
             light_filters: u32::from(self.light_filters),
             instances: self.instances.address(),
             lights: self.lights.address(),
@@ -488,7 +527,15 @@ fn build_driver_structures(
     instances: &[Instance],
     positions: &Buffer,
     indices: &Buffer,
-) -> Result<(Vec<Option<BottomLevel>>, TopLevel, BuildStatistics), GpuError> {
+) -> Result<
+    (
+        Vec<Option<BottomLevel>>,
+        TopLevel,
+        BuildStatistics,
+        Option<DynamicRefit>,
+    ),
+    GpuError,
+> {
     let g = &scene.geometry;
     let used: Vec<usize> = (0..g.meshes.len())
         .filter(|&m| g.meshes[m].triangle_count > 0)
@@ -513,17 +560,34 @@ fn build_driver_structures(
         .collect();
     let descriptions: Vec<BottomDesc<'_>> = geometries
         .iter()
-        .map(|geometries| BottomDesc {
-            name: "mesh",
-            geometries,
-            preference: BuildPreference::FastTrace,
-            allow_update: false,
-            compact: true,
+        .zip(&used)
+        .map(|(geometries, &mesh)| {
+            let moves = !g.dynamic.rest.is_empty() && mesh == g.dynamic.mesh as usize;
+            BottomDesc {
+                name: "mesh",
+                geometries,
+                preference: BuildPreference::FastTrace,
+                allow_update: moves,
+                compact: !moves,
+            }
         })
         .collect();
     let (bottom, statistics) = BottomLevel::build(device, &descriptions)?;
     let mut levels: Vec<Option<BottomLevel>> = (0..g.meshes.len()).map(|_| None).collect();
-    for (mesh, level) in used.into_iter().zip(bottom) {
+    let mut refit = None;
+    for ((mesh, level), geometries) in used.into_iter().zip(bottom).zip(&geometries) {
+        if !g.dynamic.rest.is_empty() && mesh == g.dynamic.mesh as usize {
+            let one = Refit {
+                bottom: &level,
+                geometries,
+                rebuild: false,
+            };
+            refit = Some(DynamicRefit {
+                mesh: mesh as u32,
+                scratch: Scratch::new(device, BottomLevel::refit_scratch_bytes(device, &[one]))?,
+                geometries: geometries.clone(),
+            });
+        }
         levels[mesh] = Some(level);
     }
     let placed = placed(&levels, instances);
@@ -532,5 +596,5 @@ fn build_driver_structures(
         top.record_build(cmd, &placed, 0)?;
         Ok(())
     })?;
-    Ok((levels, top, statistics))
+    Ok((levels, top, statistics, refit))
 }

@@ -1,12 +1,23 @@
 //! Bounding volume hierarchies over the scene's meshes, built by the crate `obvhs`.
 
 use super::static_geometry::{Geometry, Mesh};
+use glam::Vec3;
 use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::cwbvh::builder::{build_cwbvh, build_cwbvh_from_tris};
 use obvhs::triangle::Triangle;
 use rayon::prelude::*;
 use std::time::Duration;
+
+/// Boxes that hold the triangles of the dynamic mesh at all times; `None` for other meshes.
+pub fn swept_boxes(geometry: &Geometry, mesh: usize) -> Option<Vec<Aabb>> {
+    let dynamic = &geometry.dynamic;
+    (!dynamic.rest.is_empty() && mesh == dynamic.mesh as usize).then(|| {
+        let aabb = |[min, max]: &[Vec3; 2]| Aabb::new((*min).into(), (*max).into());
+        dynamic.boxes.iter().map(aabb).collect()
+    })
+}
 
 /// Triangles of a mesh in the form that `obvhs` takes.
 pub fn mesh_triangles(geometry: &Geometry, mesh: &Mesh) -> Vec<Triangle> {
@@ -44,13 +55,14 @@ pub fn build_cwbvhs(geometry: &Geometry) -> Vec<CwBvh> {
     geometry
         .meshes
         .par_iter()
-        .map(|mesh| {
-            let triangles = mesh_triangles(geometry, mesh);
-            build_cwbvh_from_tris(
-                &triangles,
-                build_params(mesh.triangle_count, BvhQuality::Balanced),
-                &mut Duration::default(),
-            )
+        .enumerate()
+        .map(|(index, mesh)| {
+            let params = build_params(mesh.triangle_count, BvhQuality::Balanced);
+            let mut time = Duration::default();
+            match swept_boxes(geometry, index) {
+                Some(boxes) => build_cwbvh(&boxes, params, &mut time),
+                None => build_cwbvh_from_tris(&mesh_triangles(geometry, mesh), params, &mut time),
+            }
         })
         .collect()
 }

@@ -87,7 +87,10 @@ pub struct LightInputs<'a> {
 impl LightInputs<'_> {
     /// The map's own meshes, with their numbers: models of items light nothing.
     fn map_meshes(&self) -> impl Iterator<Item = (usize, &Mesh)> {
-        self.geometry.meshes.iter().enumerate().take(self.bsp.models.len())
+        let dynamic = self.geometry.dynamic.mesh as usize;
+        let own = self.bsp.models.len();
+        let meshes = self.geometry.meshes.iter().enumerate();
+        meshes.filter(move |(i, _)| *i < own || (dynamic != 0 && *i == dynamic))
     }
 }
 
@@ -112,7 +115,7 @@ impl LightTable {
                 continue;
             };
             let range = mesh.first_triangle..mesh.first_triangle + mesh.triangle_count;
-            table.add_triangles(inputs, range, placement, index != 0);
+            table.add_triangles(inputs, range, placement, index != 0 && index < inputs.bsp.models.len());
         }
         let rest = inputs.geometry.untraced_from..inputs.geometry.triangles.len() as u32;
         table.add_triangles(inputs, rest, Affine3A::IDENTITY, false);
@@ -438,7 +441,7 @@ fn for_sky_triangles(inputs: &LightInputs, mut found: impl FnMut([Vec3; 3], u32,
             let triangle = inputs.geometry.triangles[t as usize];
             if inputs.sources[triangle.material as usize].visibility == Visibility::Sky {
                 let corners = inputs.geometry.corners(t).map(|p| placement.transform_point3(p));
-                found(corners, triangle.surface, index != 0);
+                found(corners, triangle.surface, index != 0 && index < inputs.bsp.models.len());
             }
         }
     }

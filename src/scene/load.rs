@@ -7,9 +7,10 @@ use super::entity_geometry::{self, Placement};
 use super::items;
 use super::light_cells::LightCells;
 use super::lights::{LightInputs, LightTable};
-use super::material::MaterialSource;
+use super::material::{MaterialSource, Tables};
 use super::models::Models;
-use super::records::{BspNode, Material, Stage, TcMod};
+use super::motion::Motion;
+use super::records::{BspNode, Material};
 use super::spawns::{Spawn, spawns};
 use super::static_geometry::{self, Geometry};
 use super::textures::TextureRequests;
@@ -44,9 +45,8 @@ pub struct Scene {
     /// One per shader entry of the map, then those of models.
     pub material_sources: Vec<MaterialSource>,
     pub materials: Vec<Material>,
-    /// Stages of all materials, and their changes of texture coordinates.
-    pub stages: Vec<Stage>,
-    pub tc_mods: Vec<TcMod>,
+    /// What materials point into.
+    pub tables: Tables,
     pub geometry: Geometry,
     /// Where meshes stand; placement 0 is the world.
     pub placements: Vec<Placement>,
@@ -148,10 +148,10 @@ impl Scene {
         for source in &mut material_sources {
             source.resolve(&textures);
         }
-        let (mut stages, mut tc_mods) = (Vec::new(), Vec::new());
+        let mut tables = Tables::default();
         let materials: Vec<Material> = material_sources
             .iter()
-            .map(|m| m.record(&textures, &mut stages, &mut tc_mods))
+            .map(|m| m.record(&textures, &mut tables))
             .collect();
         watch.lap("textures");
         let emits: Vec<bool> = material_sources.iter().map(|m| m.surface_light().is_some()).collect();
@@ -160,6 +160,12 @@ impl Scene {
             warnings.push("the map has no world model: nothing is drawn".to_owned());
         }
         let mut placements = entity_geometry::placements(&bsp, &entities);
+        if !geometry.dynamic.rest.is_empty() {
+            placements.push(Placement {
+                mesh: geometry.dynamic.mesh,
+                motion: Motion::Still(Affine3A::IDENTITY),
+            });
+        }
         let first_model = bsp.models.len() as u32;
         for (item, numbers) in items.iter().zip(item_models) {
             let middles = numbers.map(|n| n.map_or(Vec3::ZERO, |n| models.middle(n)));
@@ -196,8 +202,7 @@ impl Scene {
             textures,
             material_sources,
             materials,
-            stages,
-            tc_mods,
+            tables,
             geometry,
             placements,
             lights,

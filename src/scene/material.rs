@@ -2,12 +2,13 @@
 //!
 //! What the stages of a script come to is in [`super::program`]; here is what decides about the surface as a whole.
 
+use super::dynamic_geometry;
 use super::emission::{Emission, emission_colour, normalised, normalised_texture};
 use super::program::{Program, UNLIT};
 use super::records::{
-    MATERIAL_ALPHA_TESTED, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_MOVING_EMISSION,
-    MATERIAL_NO_FRONT, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,
-    Stage as StageRecord, TcMod,
+    Deform, MATERIAL_ALPHA_TESTED, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_FILTER, MATERIAL_LAYER,
+    MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES,
+    MATERIAL_TWO_SIDED_EMISSION, Material, NONE, Stage as StageRecord, TcMod,
 };
 use super::textures::{CHECKER, TextureRequests, WHITE};
 use crate::assets::bsp::lumps::surface_flags;
@@ -73,6 +74,8 @@ pub struct MaterialSource {
     /// Distance along its normals that a surface stands off its place, units.
     pub lift: f32,
     pub program: Program,
+    /// Changes of the geometry.
+    pub deforms: Vec<Deform>,
     /// Height of a sky's clouds, units.
     cloud_height: f32,
     emission: Option<EmissionSource>,
@@ -90,6 +93,14 @@ pub struct MaterialSource {
     colour_rgb: Option<Vec3>,
     /// The emitted colour, largest component 1; white until [`Self::resolve`].
     colour: Vec3,
+}
+
+/// What the records of all materials point into.
+#[derive(Clone, Debug, Default)]
+pub struct Tables {
+    pub stages: Vec<StageRecord>,
+    pub tc_mods: Vec<TcMod>,
+    pub deforms: Vec<Deform>,
 }
 
 /// `q3map_surfacelight` of a material.
@@ -169,6 +180,7 @@ impl MaterialSource {
                 cull: Cull::FrontSided,
                 lift: 0.0,
                 program: Program::default(),
+                deforms: Vec::new(),
                 cloud_height: SkyParms::DEFAULT_CLOUD_HEIGHT,
                 emission: None,
                 suns: Vec::new(),
@@ -219,6 +231,7 @@ impl MaterialSource {
             cull: shader.cull,
             lift: lift(shader, visibility),
             program,
+            deforms: shader.deforms.iter().filter_map(dynamic_geometry::record).collect(),
             cloud_height: shader
                 .sky
                 .as_ref()
@@ -277,7 +290,7 @@ impl MaterialSource {
     }
 
     /// The record that the tracers read; its stages are added to the scene's.
-    pub fn record(&self, textures: &[Texture], stages: &mut Vec<StageRecord>, mods: &mut Vec<TcMod>) -> Material {
+    pub fn record(&self, textures: &[Texture], tables: &mut Tables) -> Material {
         let mut record = Material {
             texture: self.texture,
             flags: if self.clamp { MATERIAL_CLAMP } else { 0 },
@@ -287,13 +300,16 @@ impl MaterialSource {
             shown: [0.0; 3],
             emission_texture: NONE,
             sky: [NONE; 6],
-            first_stage: stages.len() as u32,
+            first_stage: tables.stages.len() as u32,
             stage_count: 0,
             alpha_stage: NONE,
             sky_scale: [0.0; 3],
             cloud_height: self.cloud_height,
+            first_deform: tables.deforms.len() as u32,
+            deform_count: self.deforms.len() as u32,
         };
-        self.stage_record(&mut record, stages, mods);
+        tables.deforms.extend(&self.deforms);
+        self.stage_record(&mut record, tables);
         if let Some(test) = self.alpha_func
             && matches!(self.visibility, Visibility::AlphaTested | Visibility::Layer)
         {
@@ -322,10 +338,11 @@ impl MaterialSource {
         record
     }
 
-    fn stage_record(&self, record: &mut Material, stages: &mut Vec<StageRecord>, mods: &mut Vec<TcMod>) {
+    fn stage_record(&self, record: &mut Material, tables: &mut Tables) {
         if self.visibility == Visibility::Layer {
             record.flags |= MATERIAL_LAYER;
-            if self.program.filters {
+            // Quads that turn to the eye would throw shadows that follow it: they throw none.
+            if self.program.filters && !self.autosprite {
                 record.flags |= MATERIAL_FILTER;
             }
         }
@@ -338,11 +355,11 @@ impl MaterialSource {
         if record.flags & MATERIAL_STAGES == 0 && self.program.alpha_stage.is_none() {
             return;
         }
-        let first_mod = mods.len() as u32;
-        mods.extend(&self.program.mods);
+        let first_mod = tables.tc_mods.len() as u32;
+        tables.tc_mods.extend(&self.program.mods);
         record.stage_count = self.program.stages.len() as u32;
         record.alpha_stage = self.program.alpha_stage.map_or(NONE, |s| record.first_stage + s);
-        stages.extend(self.program.stages.iter().map(|s| StageRecord {
+        tables.stages.extend(self.program.stages.iter().map(|s| StageRecord {
             first_mod: s.first_mod + first_mod,
             ..*s
         }));

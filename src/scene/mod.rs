@@ -5,6 +5,7 @@ pub mod bvh;
 pub mod camera;
 pub mod clock;
 pub mod clusters;
+pub mod dynamic_geometry;
 pub mod emission;
 pub mod entity_geometry;
 pub mod items;

@@ -45,7 +45,8 @@ pub struct Program {
     pub moving_emission: bool,
 }
 
-fn wave(w: &Oscillation) -> Wave {
+/// The record of a wave.
+pub fn wave_record(w: &Oscillation) -> Wave {
     let noise = w.function == WaveFunction::Noise;
     let steps = if noise { NOISE_STEPS } else { 1.0 };
     Wave {
@@ -128,12 +129,12 @@ fn change(c: &Change) -> Option<TcMod> {
         },
         Change::Turbulence(w) => TcMod {
             kind: TC_TURBULENCE,
-            wave: wave(w),
+            wave: wave_record(w),
             ..TcMod::default()
         },
         Change::Stretch(w) => TcMod {
             kind: TC_STRETCH,
-            wave: wave(w),
+            wave: wave_record(w),
             ..TcMod::default()
         },
         Change::Rotate(degrees) => TcMod {
@@ -208,7 +209,7 @@ impl Program {
         let lit = is_lit(pass);
         let blend = pass.effective_blend().unwrap_or(Blend::REPLACE);
         let (rgb_source, rgb, rgb_wave) = match pass.rgb_gen_or_default() {
-            RgbGen::Wave(w) => (SOURCE_WAVE, Vec3::ONE, wave(&w)),
+            RgbGen::Wave(w) => (SOURCE_WAVE, Vec3::ONE, wave_record(&w)),
             RgbGen::Const(c) => (SOURCE_CONSTANT, c.clamp(Vec3::ZERO, Vec3::ONE), Wave::default()),
             RgbGen::Vertex | RgbGen::ExactVertex if !lit => (SOURCE_VERTEX, Vec3::ONE, Wave::default()),
             RgbGen::OneMinusVertex => (SOURCE_ONE_MINUS_VERTEX, Vec3::ONE, Wave::default()),
@@ -217,7 +218,7 @@ impl Program {
             _ => (SOURCE_CONSTANT, Vec3::ONE, Wave::default()),
         };
         let (alpha_source, alpha, alpha_wave) = match pass.alpha_gen_or_default() {
-            AlphaGen::Wave(w) => (SOURCE_WAVE, 1.0, wave(&w)),
+            AlphaGen::Wave(w) => (SOURCE_WAVE, 1.0, wave_record(&w)),
             AlphaGen::Const(a) => (SOURCE_CONSTANT, a.clamp(0.0, 1.0), Wave::default()),
             AlphaGen::Vertex => (SOURCE_VERTEX, 1.0, Wave::default()),
             AlphaGen::OneMinusVertex => (SOURCE_ONE_MINUS_VERTEX, 1.0, Wave::default()),

@@ -83,6 +83,54 @@ pub struct Material {
     pub sky_scale: [f32; 3],
     /// Height of a sky's clouds, units.
     pub cloud_height: f32,
+    /// Deformations in their order.
+    pub first_deform: u32,
+    pub deform_count: u32,
+}
+
+/// `Deform::kind`: along the normal by `wave`, its phase growing by `a` periods a unit of x + y + z.
+pub const DEFORM_WAVE: u32 = 0;
+/// `Deform::kind`: normals wobble by `a`.
+pub const DEFORM_NORMAL: u32 = 1;
+/// `Deform::kind`: along the normal by `b` times a sine whose phase grows by `a` periods over a texture's width.
+pub const DEFORM_BULGE: u32 = 2;
+/// `Deform::kind`: by `direction` times `wave`.
+pub const DEFORM_MOVE: u32 = 3;
+/// `Deform::kind`: quads face the eye.
+pub const DEFORM_AUTOSPRITE: u32 = 4;
+/// `Deform::kind`: quads turn about their long axis to face the eye.
+pub const DEFORM_AUTOSPRITE2: u32 = 5;
+
+/// A change of the geometry.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Deform {
+    pub kind: u32,
+    pub rate: u32,
+    pub a: f32,
+    pub b: f32,
+    pub direction: [f32; 3],
+    pub wave: Wave,
+}
+
+/// A vertex of dynamic geometry as modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RestVertex {
+    pub position: [f32; 3],
+    pub normal: [f32; 3],
+    /// First global vertex of its quad, for sprites; else [`NONE`].
+    pub quad: u32,
+    pub material: u32,
+}
+
+/// Where a dynamic triangle stands in the trees' own orders.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct DynamicTriangle {
+    pub triangle: u32,
+    pub cwbvh: u32,
+    pub bvh2: u32,
 }
 
 /// `Wave::function`: see [`crate::assets::shader_script::WaveFunction`].

@@ -1,8 +1,9 @@
 //! Static world and brush models: the map's drawn surfaces as triangles.
 
+use super::dynamic_geometry::{Dynamic, reach, swept};
 use super::material::{MaterialSource, Visibility};
 use super::models::Models;
-use super::records::{Triangle, VertexAttributes};
+use super::records::{DEFORM_AUTOSPRITE, NONE, RestVertex, Triangle, VertexAttributes};
 use crate::assets::bsp::lumps::{SURFACE_FLARE, SURFACE_PATCH, Surface};
 use crate::assets::bsp::patch::{CURVATURE_BOUND, MeshVertex, tessellate};
 use crate::assets::bsp::{Bounds, Bsp};
@@ -48,6 +49,7 @@ pub struct Geometry {
     pub triangles: Vec<Triangle>,
     /// `meshes[i]` is the map's model i, model 0 the world; then MD3 models.
     pub meshes: Vec<Mesh>,
+    pub dynamic: Dynamic,
     /// Triangles from here on belong to no mesh: emitters that rays do not meet.
     pub untraced_from: u32,
     /// Triangles dropped because they have no area.
@@ -126,6 +128,11 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
         .into_par_iter()
         .map(|i| surface_mesh(bsp, materials, i))
         .collect();
+    let deforms = |s: &SurfaceMesh| {
+        !materials[bsp.surfaces[s.surface as usize].shader as usize]
+            .deforms
+            .is_empty()
+    };
     let visibility = |s: &SurfaceMesh| materials[bsp.surfaces[s.surface as usize].shader as usize].visibility;
     let mut out = Geometry::default();
     let mut untraced = Vec::new();
@@ -146,7 +153,7 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
                         false
                     }
                 };
-                if wanted {
+                if wanted && !(model_index == 0 && deforms(mesh)) {
                     out.append(bsp, mesh);
                     for v in &mesh.vertices {
                         bounds.include(v.position);
@@ -173,6 +180,19 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
         mesh.bounds = bounds;
     }
     models.append(&mut out, materials);
+    let world = bsp.models.first().map_or(0..0, |m| {
+        let first = m.first_surface.max(0) as usize;
+        first..first + m.surface_count.max(0) as usize
+    });
+    let dynamic: Vec<&SurfaceMesh> = meshes[world]
+        .iter()
+        .filter(|m| deforms(m) && visibility(m) != Visibility::Invisible)
+        .collect();
+    if !dynamic.is_empty() {
+        out.append_dynamic(bsp, materials, &dynamic, |m| {
+            matches!(visibility(m), Visibility::Opaque | Visibility::Sky)
+        });
+    }
     out.untraced_from = out.triangles.len() as u32;
     for surface in untraced {
         out.append(bsp, &meshes[surface as usize]);
@@ -181,6 +201,68 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
 }
 
 impl Geometry {
+    /// Appends the world's deforming surfaces as a mesh of their own.
+    fn append_dynamic(
+        &mut self,
+        bsp: &Bsp,
+        materials: &[MaterialSource],
+        surfaces: &[&SurfaceMesh],
+        opaque: impl Fn(&SurfaceMesh) -> bool,
+    ) {
+        let first_triangle = self.triangles.len() as u32;
+        let first_vertex = self.positions.len() as u32;
+        let mut opaque_count = 0;
+        let mut boxes = Vec::new();
+        let mut rest = Vec::new();
+        for wanted in [true, false] {
+            for mesh in surfaces.iter().filter(|m| opaque(m) == wanted) {
+                let base = self.positions.len() as u32;
+                let first = self.triangles.len();
+                self.append(bsp, mesh);
+                let material = bsp.surfaces[mesh.surface as usize].shader as u32;
+                let deforms = &materials[material as usize].deforms;
+                let sprites = deforms.iter().any(|d| d.kind >= DEFORM_AUTOSPRITE);
+                let quads = sprites && mesh.vertices.len().is_multiple_of(4);
+                rest.extend(mesh.vertices.iter().enumerate().map(|(i, v)| RestVertex {
+                    position: v.position.into(),
+                    normal: v.normal.into(),
+                    quad: if quads { base + i as u32 / 4 * 4 } else { NONE },
+                    // What is made of anything but quads can't turn.
+                    material: if sprites && !quads { NONE } else { material },
+                }));
+                for t in first..self.triangles.len() {
+                    let vertices = self.triangles[t].vertices;
+                    let at = |v: u32| Vec3::from(self.positions[v as usize]);
+                    let quad = quads.then(|| {
+                        let q = base + (vertices[0] - base) / 4 * 4;
+                        std::array::from_fn(|k| at(q + k as u32))
+                    });
+                    boxes.push(swept(vertices.map(at), quad, reach(deforms)));
+                }
+            }
+            if wanted {
+                opaque_count = self.triangles.len() as u32 - first_triangle;
+            }
+        }
+        let mut bounds = Bounds::EMPTY;
+        for corner in boxes.as_flattened() {
+            bounds.include(*corner);
+        }
+        self.dynamic = Dynamic {
+            mesh: self.meshes.len() as u32,
+            vertices: first_vertex..self.positions.len() as u32,
+            rest,
+            boxes,
+        };
+        self.meshes.push(Mesh {
+            class: GeometryClass::WorldDynamic,
+            first_triangle,
+            opaque_count,
+            triangle_count: self.triangles.len() as u32 - first_triangle,
+            bounds,
+        });
+    }
+
     fn append(&mut self, bsp: &Bsp, mesh: &SurfaceMesh) {
         let base = self.positions.len() as u32;
         for v in &mesh.vertices {
