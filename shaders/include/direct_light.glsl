@@ -27,53 +27,58 @@ vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
     return visible(offset_point(at.position, at.geometric_normal), s) * s.value;
 }
 
-// One light resampled from candidates in proportion to what they give without visibility.
-vec3 resampled(Chances chances, uint i, uint address, SurfaceHit at, inout uvec2 counts) {
-    uint n = clamp(FC.light_candidates, 1, MAX_CANDIDATES);
-    LightSample kept = LightSample(vec3(0.0), vec3(0.0), false);
-    float kept_target = 0.0;
-    float sum = 0.0;
-    [[dont_unroll]] for (uint c = i * MAX_CANDIDATES; c < i * MAX_CANDIDATES + n; c++) {
-        uvec2 bits = random_bits(address, DIM_CANDIDATE_PICK + c);
-        Choice choice = choose_light(chances, at, bits.x);
-        if (choice.light == NONE) continue;
-        LightSample s = sampled(choice.light, DIM_CANDIDATE_POINT + c, address, at);
-        float target = luminance(s.value);
-        if (!(target > 0.0)) continue;
-        float weight = target / choice.probability;
-        sum += weight;
-        if (unit_float(bits.y) * sum < weight) {
-            kept = s;
-            kept_target = target;
-        }
-    }
-    vec3 value = traced(kept, at, counts);
-    return kept_target > 0.0 ? value * (sum / (kept_target * float(n))) : vec3(0.0);
-}
-
+// Lights sampled by all ways in one loop: what is chosen differs, not how it is sampled and traced. Compilers copy a function
+// to every call, and these are large.
 vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     Chances chances = chances_at(at);
     LightRow row = chances.row;
+    bool every = FC.random_lights == 0;
+    bool resampled = !every && FC.light_sampling == SAMPLING_RESERVOIR;
+    uint count = every ? row.light_count : FC.random_lights;
+    // One light of several candidates is kept in proportion to what each gives without visibility.
+    uint n = resampled ? clamp(FC.light_candidates, 1, MAX_CANDIDATES) : 1;
+    float share = every ? 1.0 : 1.0 / float(FC.random_lights);
+    uint r = 0;
+    uint in_run = 0;
     vec3 sum = vec3(0.0);
-    if (FC.random_lights == 0) {
-        [[dont_unroll]] for (uint r = 0; r < row.run_count; r++) {
-            LightRun run = FC.light_runs.at[row.first_run + r];
-            [[dont_unroll]] for (uint light = run.first_light; light < run.first_light + run.count; light++) {
-                sum += traced(sampled(light, DIM_EVERY_LIGHT + light, address, at), at, counts);
+    [[dont_unroll]] for (uint i = 0; i < count; i++) {
+        LightSample kept = LightSample(vec3(0.0), vec3(0.0), false);
+        float kept_target = 0.0;
+        float weights = 0.0;
+        [[dont_unroll]] for (uint c = 0; c < n; c++) {
+            Choice choice;
+            uint dimension;
+            float keep = 0.0;
+            if (every) {
+                LightRun run = FC.light_runs.at[row.first_run + r];
+                choice.light = run.first_light + in_run;
+                choice.probability = 1.0;
+                dimension = DIM_EVERY_LIGHT + choice.light;
+                in_run++;
+                if (in_run >= run.count) {
+                    in_run = 0;
+                    r++;
+                }
+            } else {
+                uint at_ = resampled ? DIM_CANDIDATE_PICK + i * MAX_CANDIDATES + c : DIM_LIGHT_PICK + i;
+                uvec2 bits = random_bits(address, at_);
+                choice = choose_light(chances, at, bits.x);
+                if (choice.light == NONE) continue;
+                dimension = resampled ? DIM_CANDIDATE_POINT + i * MAX_CANDIDATES + c : DIM_LIGHT_POINT + i;
+                keep = unit_float(bits.y);
+            }
+            LightSample s = sampled(choice.light, dimension, address, at);
+            float target = luminance(s.value);
+            if (!(target > 0.0)) continue;
+            float weight = target / choice.probability;
+            weights += weight;
+            if (!resampled || keep * weights < weight) {
+                kept = s;
+                kept_target = target;
             }
         }
-        return sum;
-    }
-    float share = 1.0 / float(FC.random_lights);
-    [[dont_unroll]] for (uint i = 0; i < FC.random_lights; i++) {
-        if (FC.light_sampling == SAMPLING_RESERVOIR) {
-            sum += resampled(chances, i, address, at, counts) * share;
-            continue;
-        }
-        Choice choice = choose_light(chances, at, random_bits(address, DIM_LIGHT_PICK + i).x);
-        if (choice.light == NONE) continue;
-        LightSample s = sampled(choice.light, DIM_LIGHT_POINT + i, address, at);
-        sum += traced(s, at, counts) * (share / choice.probability);
+        vec3 value = traced(kept, at, counts);
+        if (kept_target > 0.0) sum += value * (weights / (kept_target * float(n)) * share);
     }
     return sum;
 }

@@ -31,11 +31,12 @@ Seen see(vec3 origin, vec3 direction, uint address) {
     SurfaceHit lit;
     Hit lit_hit;
     vec3 lit_share = vec3(0.0);
-    float t = 0.0;
-    uint triangle = NONE;
+    begin_walk();
     uint dimension = DIM_LAYER;
     [[dont_unroll]] for (uint i = 0; i < MOST_LAYERS; i++) {
-        Hit hit = trace_next(origin, direction, RAY_FAR, t, triangle);
+        meets_layers = true;
+        Hit hit = trace(origin, direction, RAY_FAR, false);
+        meets_layers = false;
         if (hit.triangle == NONE || max(out_.share.x, max(out_.share.y, out_.share.z)) <= LEAST_SHARE) {
             if (pending) {
                 out_.surface = lit;
@@ -44,15 +45,15 @@ Seen see(vec3 origin, vec3 direction, uint address) {
             }
             return out_;
         }
-        t = hit.t;
-        triangle = hit.triangle;
+        walk_on(hit);
         Material material = FC.materials.at[FC.triangles.at[hit.triangle].material];
         SurfaceHit s = surface_at(hit, direction, FC.cone);
         if (!drawn(material, s.front)) continue;
+        vec3 emission = emission_seen(s, direction);
         bool layer = (material.flags & MATERIAL_LAYER) != 0;
         if (pending) {
             if (!layer && hit.t - lit_hit.t <= ON_RECEIVER) {
-                out_.emission = lit.through * emission_seen(s, direction);
+                out_.emission = lit.through * emission;
                 s.albedo = lit.albedo + lit.through * s.albedo;
                 out_.surface = s;
                 out_.hit = hit;
@@ -75,7 +76,6 @@ Seen see(vec3 origin, vec3 direction, uint address) {
             }
             pending = false;
         }
-        vec3 emission = emission_seen(s, direction);
         if (!layer) {
             out_.surface = s;
             out_.hit = hit;

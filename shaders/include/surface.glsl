@@ -8,7 +8,7 @@ struct SurfaceHit {
     vec3 shading_normal;
     vec2 uv;
     vec3 albedo;
-    // Radiance of stages that shine by themselves.
+    // Radiance of stages that shine by themselves; of a sky, all that is seen.
     vec3 glow;
     // Share of what is behind that shows through.
     vec3 through;
@@ -65,81 +65,6 @@ float texture_lod(vec3 e1, vec3 e2, vec2 uv0, vec2 uv1, vec2 uv2, vec2 size, flo
     return 0.5 * log2(max(ratio, 1.17549435e-38)) + log2(max(width / max(abs(cosine), 1e-3), 1.17549435e-38));
 }
 
-// A hit as far as geometry and material go; `cluster` and `row` are left to `surface_at`.
-SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
-    SurfaceHit s;
-    Instance instance = FC.instances.at[hit.instance];
-    Triangle t = FC.triangles.at[hit.triangle];
-    vec3 a = FC.positions.at[t.vertices[0]];
-    vec3 b = FC.positions.at[t.vertices[1]];
-    vec3 c = FC.positions.at[t.vertices[2]];
-    VertexAttributes va = FC.attributes.at[t.vertices[0]];
-    VertexAttributes vb = FC.attributes.at[t.vertices[1]];
-    VertexAttributes vc = FC.attributes.at[t.vertices[2]];
-    float b1 = hit.barycentrics.x;
-    float b2 = hit.barycentrics.y;
-    float b0 = 1.0 - b1 - b2;
-    s.position = point_to_world(instance, a * b0 + b * b1 + c * b2);
-    s.geometric_normal = normalize(normal_to_world(instance, cross(b - a, c - a)));
-    vec3 interpolated = normal_to_world(instance, va.normal * b0 + vb.normal * b1 + vc.normal * b2);
-    float len = length(interpolated);
-    s.shading_normal = len > 0.0 ? interpolated / len : s.geometric_normal;
-    if (dot(s.shading_normal, s.geometric_normal) < 0.0) s.shading_normal = s.geometric_normal;
-    s.front = dot(s.geometric_normal, direction) <= 0.0;
-    if (!s.front) {
-        s.geometric_normal = -s.geometric_normal;
-        s.shading_normal = -s.shading_normal;
-    }
-    s.uv = va.uv * b0 + vb.uv * b1 + vc.uv * b2;
-    s.material = t.material;
-    s.triangle = hit.triangle;
-    s.albedo = vec3(0.0);
-    s.glow = vec3(0.0);
-    s.through = vec3(0.0);
-    s.cluster = NONE;
-    s.row = t.fallback_row;
-    Material material = FC.materials.at[t.material];
-    if ((material.flags & MATERIAL_SKY) != 0) return s;
-    float d = length(direction);
-    float width = cone * hit.t * d;
-    float cosine = dot(s.geometric_normal, direction) / d;
-    if ((material.flags & MATERIAL_STAGES) != 0) {
-        Point p;
-        p.uv = s.uv;
-        p.lightmap_uv = va.lightmap_uv * b0 + vb.lightmap_uv * b1 + vc.lightmap_uv * b2;
-        p.colour = unpackUnorm4x8(va.color) * b0 + unpackUnorm4x8(vb.color) * b1 + unpackUnorm4x8(vc.color) * b2;
-        p.position = s.position;
-        p.normal = s.shading_normal;
-        p.to_viewer = -direction / d;
-        p.distance = hit.t * d;
-        p.lod = cone > 0.0 ? texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(1.0), width, cosine) : -1e30;
-        Shade shaded = shade(material, p);
-        s.albedo = shaded.albedo;
-        s.glow = shaded.glow;
-        s.through = shaded.through;
-        return s;
-    }
-    float lod = 0.0;
-    if (cone > 0.0) {
-        TextureInfo info = FC.textures.at[material.texture_index];
-        lod = texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(info.width, info.height), width, cosine);
-    }
-    s.albedo = sample_texture(material.texture_index, s.uv, lod, (material.flags & MATERIAL_CLAMP) != 0).rgb;
-    return s;
-}
-
-SurfaceHit surface_at(Hit hit, vec3 direction, float cone) {
-    SurfaceHit s = shaded_hit(hit, direction, cone);
-    s.cluster = classify(s.position, s.geometric_normal);
-    if (s.cluster != NONE) s.row = s.cluster;
-    return s;
-}
-
-// Whether a surface is drawn on the side that a ray meets.
-bool drawn(Material material, bool front) {
-    return (material.flags & (front ? MATERIAL_NO_FRONT : MATERIAL_BACK)) == (front ? 0 : MATERIAL_BACK);
-}
-
 uint sky_box_side(vec3 d, out vec2 uv) {
     vec3 a = abs(d);
     uint side;
@@ -187,23 +112,107 @@ Point point_on_texture(vec2 uv, vec3 position, vec3 to_viewer) {
     return p;
 }
 
-// The same as it is seen.
-vec3 sky_seen(Material material, vec3 direction) {
+// What a sky's stages look at: the cloud layer is a dome, below the horizon there is none.
+Point cloud_point(Material material, vec3 d) {
+    vec2 uv = cloud_coordinates(vec3(d.xy, max(d.z, 0.0)), material.cloud_height);
+    Point p = point_on_texture(uv, d * CLOUD_DISTANCE, -d);
+    p.distance = CLOUD_DISTANCE;
+    return p;
+}
+
+// Radiance of a sky as it is seen, with what its stages come to.
+vec3 sky_seen(Material material, vec3 direction, Shade clouds) {
     bool has_box = (material.flags & MATERIAL_SKY_BOX) != 0;
     if (!has_box && (material.flags & MATERIAL_STAGES) == 0) {
         return FC.shown_emission == 0 ? material.shown : material.emission;
     }
     vec3 picture = has_box ? sky_box(material, direction) : vec3(0.0);
-    if ((material.flags & MATERIAL_STAGES) != 0) {
-        vec3 d = normalize(direction);
-        // The cloud layer is a dome; below the horizon there is none.
-        vec2 uv = cloud_coordinates(vec3(d.xy, max(d.z, 0.0)), material.cloud_height);
-        Point p = point_on_texture(uv, d * CLOUD_DISTANCE, -d);
-        p.distance = CLOUD_DISTANCE;
-        Shade clouds = shade(material, p);
-        picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
-    }
+    picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
     return picture * (FC.shown_emission == 0 ? material.shown : material.sky_scale);
+}
+
+// A hit as far as geometry and material go; `cluster` and `row` are left to `surface_at`.
+SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
+    SurfaceHit s;
+    Instance instance = FC.instances.at[hit.instance];
+    Triangle t = FC.triangles.at[hit.triangle];
+    vec3 a = FC.positions.at[t.vertices[0]];
+    vec3 b = FC.positions.at[t.vertices[1]];
+    vec3 c = FC.positions.at[t.vertices[2]];
+    VertexAttributes va = FC.attributes.at[t.vertices[0]];
+    VertexAttributes vb = FC.attributes.at[t.vertices[1]];
+    VertexAttributes vc = FC.attributes.at[t.vertices[2]];
+    float b1 = hit.barycentrics.x;
+    float b2 = hit.barycentrics.y;
+    float b0 = 1.0 - b1 - b2;
+    s.position = point_to_world(instance, a * b0 + b * b1 + c * b2);
+    s.geometric_normal = normalize(normal_to_world(instance, cross(b - a, c - a)));
+    vec3 interpolated = normal_to_world(instance, va.normal * b0 + vb.normal * b1 + vc.normal * b2);
+    float len = length(interpolated);
+    s.shading_normal = len > 0.0 ? interpolated / len : s.geometric_normal;
+    if (dot(s.shading_normal, s.geometric_normal) < 0.0) s.shading_normal = s.geometric_normal;
+    s.front = dot(s.geometric_normal, direction) <= 0.0;
+    if (!s.front) {
+        s.geometric_normal = -s.geometric_normal;
+        s.shading_normal = -s.shading_normal;
+    }
+    s.uv = va.uv * b0 + vb.uv * b1 + vc.uv * b2;
+    s.material = t.material;
+    s.triangle = hit.triangle;
+    s.albedo = vec3(0.0);
+    s.glow = vec3(0.0);
+    s.through = vec3(0.0);
+    s.cluster = NONE;
+    s.row = t.fallback_row;
+    Material material = FC.materials.at[t.material];
+    bool sky = (material.flags & MATERIAL_SKY) != 0;
+    float d = length(direction);
+    float width = cone * hit.t * d;
+    float cosine = dot(s.geometric_normal, direction) / d;
+    if ((material.flags & MATERIAL_STAGES) != 0) {
+        Point p;
+        p.uv = s.uv;
+        p.lightmap_uv = va.lightmap_uv * b0 + vb.lightmap_uv * b1 + vc.lightmap_uv * b2;
+        p.colour = unpackUnorm4x8(va.color) * b0 + unpackUnorm4x8(vb.color) * b1 + unpackUnorm4x8(vc.color) * b2;
+        p.position = s.position;
+        p.normal = s.shading_normal;
+        p.to_viewer = -direction / d;
+        p.distance = hit.t * d;
+        p.lod = cone > 0.0 ? texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(1.0), width, cosine) : -1e30;
+        if (sky) p = cloud_point(material, direction / d);
+        Shade shaded = shade(material, p);
+        if (sky) {
+            s.glow = sky_seen(material, direction, shaded);
+            return s;
+        }
+        s.albedo = shaded.albedo;
+        s.glow = shaded.glow;
+        s.through = shaded.through;
+        return s;
+    }
+    if (sky) {
+        s.glow = sky_seen(material, direction, Shade(vec3(0.0), vec3(0.0), vec3(1.0)));
+        return s;
+    }
+    float lod = 0.0;
+    if (cone > 0.0) {
+        TextureInfo info = FC.textures.at[material.texture_index];
+        lod = texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(info.width, info.height), width, cosine);
+    }
+    s.albedo = sample_texture(material.texture_index, s.uv, lod, (material.flags & MATERIAL_CLAMP) != 0).rgb;
+    return s;
+}
+
+SurfaceHit surface_at(Hit hit, vec3 direction, float cone) {
+    SurfaceHit s = shaded_hit(hit, direction, cone);
+    s.cluster = classify(s.position, s.geometric_normal);
+    if (s.cluster != NONE) s.row = s.cluster;
+    return s;
+}
+
+// Whether a surface is drawn on the side that a ray meets.
+bool drawn(Material material, bool front) {
+    return (material.flags & (front ? MATERIAL_NO_FRONT : MATERIAL_BACK)) == (front ? 0 : MATERIAL_BACK);
 }
 
 // What a surface emits over its factor at a point of its texture.
@@ -227,7 +236,7 @@ vec3 emitted(Material material, vec2 uv, vec3 position, vec3 direction) {
 // Radiance that a ray receives from a surface it hits, but for the light that the surface reflects.
 vec3 emission_seen(SurfaceHit s, vec3 direction) {
     Material material = FC.materials.at[s.material];
-    if ((material.flags & MATERIAL_SKY) != 0) return sky_seen(material, direction);
+    if ((material.flags & MATERIAL_SKY) != 0) return s.glow;
     vec3 factor = FC.shown_emission == 0 ? material.shown : material.emission;
     bool emits = s.front || (material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER)) != 0;
     if (!emits || factor == vec3(0.0)) return s.glow;

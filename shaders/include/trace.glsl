@@ -89,18 +89,18 @@ bool trace_any(vec3 origin, vec3 direction, float t_max) {
     return trace(origin, direction, t_max, true).triangle != NONE;
 }
 
-#ifdef TRACE_LAYERS
-// The nearest hit of all with t < t_max that comes after another one, layers included. Before the first: t 0, triangle NONE.
-Hit trace_next(vec3 origin, vec3 direction, float t_max, float t, uint triangle) {
-    meets_layers = true;
-    after_t = t;
-    after_triangle = triangle;
-    after_opaque = triangle != NONE
-        && (FC.materials.at[FC.triangles.at[triangle].material].flags & (MATERIAL_LAYER | MATERIAL_ALPHA_TESTED)) == 0;
-    Hit hit = trace(origin, direction, t_max, false);
-    meets_layers = false;
-    return hit;
+// Puts a walk through layers, by `trace` with `meets_layers`, before the first hit.
+void begin_walk() {
+    after_t = 0.0;
+    after_triangle = NONE;
+    after_opaque = false;
 }
-#endif
+
+// Puts it behind a hit.
+void walk_on(Hit hit) {
+    after_t = hit.t;
+    after_triangle = hit.triangle;
+    after_opaque = (FC.materials.at[FC.triangles.at[hit.triangle].material].flags & (MATERIAL_LAYER | MATERIAL_ALPHA_TESTED)) == 0;
+}
 
 #endif
