@@ -296,12 +296,12 @@ impl SceneGpu {
                 .ok_or_else(|| GpuError::InvalidInput("a scene buffer is used twice".into()))
         };
         let index_buffer = take(index_buffer)?;
-        let driver = driver.map(|(bottom, top, statistics, refit)| DriverStructures {
-            refit,
+        let driver = driver.map(|built| DriverStructures {
             _index_buffer: index_buffer,
-            bottom,
-            top,
-            statistics,
+            bottom: built.bottom,
+            top: built.top,
+            statistics: built.statistics,
+            refit: built.refit,
         });
         let sampler = Sampler::new(device, "texels", &SamplerDesc::default())?;
         let (layout, sets) = scene_set(device, backend, driver.as_ref(), &textures, &sampler)?;
@@ -520,6 +520,14 @@ fn placed(bottom: &[Option<BottomLevel>], instances: &[Instance]) -> Vec<TopInst
         .collect()
 }
 
+/// Structures before they have the buffer that they were built from.
+struct BuiltStructures {
+    bottom: Vec<Option<BottomLevel>>,
+    top: TopLevel,
+    statistics: BuildStatistics,
+    refit: Option<DynamicRefit>,
+}
+
 /// Geometry 0 of every bottom level is opaque, geometry 1 alpha-tested; a mesh without triangles is not placed.
 fn build_driver_structures(
     device: &Arc<Device>,
@@ -527,15 +535,7 @@ fn build_driver_structures(
     instances: &[Instance],
     positions: &Buffer,
     indices: &Buffer,
-) -> Result<
-    (
-        Vec<Option<BottomLevel>>,
-        TopLevel,
-        BuildStatistics,
-        Option<DynamicRefit>,
-    ),
-    GpuError,
-> {
+) -> Result<BuiltStructures, GpuError> {
     let g = &scene.geometry;
     let used: Vec<usize> = (0..g.meshes.len())
         .filter(|&m| g.meshes[m].triangle_count > 0)
@@ -596,5 +596,10 @@ fn build_driver_structures(
         top.record_build(cmd, &placed, 0)?;
         Ok(())
     })?;
-    Ok((levels, top, statistics, refit))
+    Ok(BuiltStructures {
+        bottom: levels,
+        top,
+        statistics,
+        refit,
+    })
 }

@@ -141,7 +141,13 @@ impl Scene {
             };
             item_models.push([number(item.item.models[0])?, number(item.item.models[1])?]);
         }
-        warnings.append(&mut models.warnings);
+        // Second models are extras that not every game has.
+        let extra = |w: &String| {
+            !items
+                .iter()
+                .any(|i| w.ends_with(i.item.models[1]) && !i.item.models[1].is_empty())
+        };
+        warnings.extend(models.warnings.drain(..).filter(extra));
         watch.lap("models");
         let (textures, missing) = requests.load(files);
         warnings.extend(missing);
