@@ -8,13 +8,14 @@ mod gpu_fixture;
 use common::analytic::{
     ceiling_light, emitter_on_floor, emitter_radiance, floor_emitter, point_light, polygon, sunlit, under_dome,
 };
-use common::{blocks, camera, gpu_film, mean_and_error, quiet, scene, still};
+use common::{blocks, camera, mean_and_error, quiet, scene, still};
 use glam::{DVec3, Vec3};
 use gpu_fixture::with_device;
 use q3rays::assets::bsp::build::fixtures::{LitBox, furnace, lit_box};
 use q3rays::reference::CpuRenderer;
 use q3rays::render::backend::Backend;
 use q3rays::render::film::Film;
+use q3rays::render::gpu_renderer::GpuRenderer;
 use q3rays::render::scene_gpu::SceneGpu;
 use q3rays::scene::Scene;
 use q3rays::scene::bvh::BvhQuality;
@@ -137,11 +138,18 @@ fn a_rectangle_over_a_plane_on_the_gpu() {
     let truth = truth(&CpuRenderer::new(&scene), &down(), rectangle);
     with_device(|device| {
         let gpu = SceneGpu::new(device, &scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
+        let renderer = GpuRenderer::new(&gpu).unwrap();
         for lights in [0, 1] {
             agree(
                 &format!("rectangle on the GPU, {lights} lights"),
                 &truth,
-                &|seed, samples| gpu_film(&gpu, &down(), SIZE, &still(lights, Sequence::Sobol, seed), samples),
+                &|seed, samples| {
+                    let settings = still(lights, Sequence::Sobol, seed);
+                    renderer
+                        .accumulate(&down(), SIZE, &settings, 0..samples, &quiet)
+                        .unwrap()
+                        .0
+                },
             );
         }
     });

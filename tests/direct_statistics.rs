@@ -6,13 +6,14 @@ mod common;
 mod gpu_fixture;
 
 use common::analytic::{ceiling_light, emitter_on_floor, emitter_radiance, polygon};
-use common::{blocks, camera, gpu_film, mean_and_error, quiet, scene, still};
+use common::{blocks, camera, mean_and_error, quiet, scene, still};
 use glam::Vec3;
 use gpu_fixture::with_device;
 use q3rays::assets::bsp::build::fixtures::{Doorways, Fixture, LitBox, chain, doorway_light, free_emitter, lit_box};
 use q3rays::reference::CpuRenderer;
 use q3rays::render::backend::Backend;
 use q3rays::render::film::Film;
+use q3rays::render::gpu_renderer::GpuRenderer;
 use q3rays::render::scene_gpu::SceneGpu;
 use q3rays::render::settings::LightSampling;
 use q3rays::scene::bvh::BvhQuality;
@@ -158,6 +159,8 @@ fn random_lights_have_the_mean_of_all_on_the_gpu() {
         let fixture = chain(5, Doorways::Staggered, 1000).unwrap();
         let (scene, camera) = (scene(&fixture), camera([230.3, 70.6, 60.2], 8.0, 2.0, 90.0));
         let gpu = SceneGpu::new(device, &scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
+        // Making the pipelines takes longer than most of the images.
+        let renderer = GpuRenderer::new(&gpu).unwrap();
         let film = |sampling: LightSampling, lights: u32, seed: u32, samples: u32| {
             let mut settings = still(
                 lights,
@@ -165,7 +168,10 @@ fn random_lights_have_the_mean_of_all_on_the_gpu() {
                 10_000 * sampling as u32 + 1000 * lights + seed,
             );
             settings.light_sampling = sampling;
-            gpu_film(&gpu, &camera, SIZE, &settings, samples)
+            let (film, _) = renderer
+                .accumulate(&camera, SIZE, &settings, 0..samples, &quiet)
+                .unwrap();
+            film
         };
         let all = measure(0..SEEDS, 4, &|seed, samples| {
             film(LightSampling::Uniform, 0, seed, samples)
