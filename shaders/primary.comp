@@ -52,21 +52,24 @@ void main() {
     }
     SurfaceHit s = seen.surface;
     imageStore(gbuffer_albedo, p, vec4(s.albedo, 1.0));
-    imageStore(gbuffer_position, p, vec4(s.position, hit.t));
+    imageStore(gbuffer_position, p, vec4(s.position, seen.distance));
     imageStore(gbuffer_surface, p, uvec4(pack_normal(s.shading_normal), pack_normal(s.geometric_normal), s.material, s.row));
     imageStore(gbuffer_object, p, uvec4(hit.triangle, hit.instance, packUnorm2x16(hit.barycentrics), s.cluster));
     imageStore(image_emission, p, vec4(seen.emission, 0.0));
     // A sky's picture is infinitely far away, wherever the surface that shows it is.
     bool sky = (FC.materials.at[s.material].flags & MATERIAL_SKY) != 0;
-    vec2 motion = sky ? motion_of_direction(direction) : motion_of(s.position);
-    vec3 old_position = s.position;
+    // Seen in a mirror, a surface moves as its image behind the mirror does.
+    vec3 place = mapped(seen.place, s.position, 1.0);
+    vec3 normal = mapped(seen.place, s.shading_normal, 0.0);
+    vec2 motion = sky ? motion_of_direction(direction) : motion_of(place);
+    vec3 old_position = place;
     Instance instance = FC.instances.at[hit.instance];
     bool dynamic = FC.triangles.at[hit.triangle].vertices[0] >= FC.first_dynamic_vertex;
     if (instance.moves != 0 || dynamic) {
-        old_position = old_position_of(instance, hit);
-        motion = motion_between(s.position - FC.eye, old_position - FC.old_eye);
+        old_position = mapped(seen.place, old_position_of(instance, hit), 1.0);
+        motion = motion_between(place - FC.eye, old_position - FC.old_eye);
     }
-    imageStore(gbuffer_motion, p, vec4(motion, hit.t, dot(old_position - FC.old_eye, FC.old_forward)));
-    float depth = s.albedo == vec3(0.0) ? 0.0 : dot(s.position - FC.eye, FC.forward);
-    imageStore(guide, p, pack_guide(depth, to_view(s.shading_normal), s.material, hit.instance));
+    imageStore(gbuffer_motion, p, vec4(motion, seen.distance, dot(old_position - FC.old_eye, FC.old_forward)));
+    float depth = s.albedo == vec3(0.0) ? 0.0 : dot(place - FC.eye, FC.forward);
+    imageStore(guide, p, pack_guide(depth, to_view(normal), s.material, hit.instance));
 }

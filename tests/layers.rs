@@ -302,3 +302,94 @@ fn moved_points(gpu: &SceneGpu, scene: &Scene, size: (u32, u32)) {
     }
     assert!(seen > 50 && moved > 10, "{seen} {moved}");
 }
+
+/// A box lit from a corner, with or without a mirror before its far wall.
+fn mirrored(mirror: bool) -> Scene {
+    let script = "textures/fixture/mirror\n{\n\tportal\n\tsurfaceparm nolightmap\n\t{\n\t\tmap $whiteimage\n\t\tblendFunc GL_ZERO \
+                  GL_ONE\n\t\tdepthWrite\n\t}\n}\n";
+    let fixture = boxed("mirrored", script, |map, _| {
+        let paint = Paint {
+            shader: map.shader("textures/fixture/mirror", surface_flags::NOLIGHTMAP, 0),
+            mapping: Mapping::Fit,
+        };
+        if mirror {
+            let at = |y: f32, z: f32| Vec3::new(240.0, y, z);
+            map.quad([at(0.5, 0.5), at(0.5, 255.5), at(255.5, 255.5), at(255.5, 0.5)], paint);
+        }
+        map.entity(Entity::light(Vec3::new(40.0, 70.0, 210.0), 300.0, [1.0, 0.6, 0.3]));
+    });
+    scene(&fixture)
+}
+
+/// What a mirror shows is what an eye behind it sees, turned left to right; and its points move as their images do.
+#[test]
+fn a_mirror_shows_what_an_eye_behind_it_sees() {
+    let (size, plane) = ((40, 30), 2.0 * 240.0);
+    let still = Settings {
+        random_lights: 0,
+        soft_shadows: false,
+        antialiasing: false,
+        ..settings()
+    };
+    let before = camera([60.0, 120.3, 90.7], 0.0, 6.0, 60.0);
+    let behind = camera([plane - 60.0, 120.3, 90.7], 0.0, 174.0, 60.0);
+    let (with, without) = (mirrored(true), mirrored(false));
+    assert_eq!((with.portals.len(), without.portals.len()), (1, 0));
+    let (want, _) = CpuRenderer::new(&without).accumulate(&behind, size, &still, 0..1, &quiet);
+    let agree = |name: &str, got: &[[f32; 3]]| {
+        let differs = |i: &usize| {
+            let (x, y) = (*i as u32 % size.0, *i as u32 / size.0);
+            let other = want.mean[(y * size.0 + size.0 - 1 - x) as usize];
+            (0..3).any(|c| (got[*i][c] - other[c]).abs() > 2e-3 * other[c] + 1e-5)
+        };
+        let off = (0..got.len()).filter(differs).count();
+        assert!(off * 100 < got.len(), "{name}: {off} of {}", got.len());
+    };
+    let (cpu, _) = CpuRenderer::new(&with).accumulate(&before, size, &still, 0..1, &quiet);
+    agree("cpu", &cpu.mean);
+    with_device(|device| {
+        for backend in [Backend::Bvh, Backend::RayQuery] {
+            let gpu = SceneGpu::new(device, &with, backend, BvhQuality::Balanced).unwrap();
+            agree(&backend.to_string(), &gpu_film(&gpu, &before, size, &still, 1).mean);
+        }
+        let gpu = SceneGpu::new(device, &with, Backend::Bvh, BvhQuality::Balanced).unwrap();
+        let renderer = GpuRenderer::new(&gpu).unwrap();
+        let mut view = renderer.view(size).unwrap();
+        let mut old = before;
+        old.eye = [58.0, 123.3, 91.7];
+        old.yaw += 2.0;
+        for (index, c) in [(0, old), (1, before)] {
+            let input = FrameInput {
+                camera: c,
+                settings: still,
+                sample_index: index,
+                accumulated: 0,
+                exposure_blend: 1.0,
+                reuse: false,
+                output: false,
+            };
+            renderer.frame(&mut view, &input).unwrap();
+        }
+        let floats = |image: &Image| -> Vec<[f32; 4]> {
+            let bytes = image.read_back(0).unwrap();
+            bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect()
+        };
+        let project = |c: &q3rays::scene::camera::Camera, p: Vec3| {
+            let (axes, (w, h)) = (c.axes(), c.half_extent(size.0, size.1));
+            let d = p - Vec3::from(c.eye);
+            let depth = d.dot(axes.forward);
+            let (x, y) = (d.dot(axes.right) / depth / w, d.dot(axes.up) / depth / h);
+            [(0.5 + 0.5 * x) * size.0 as f32, (0.5 - 0.5 * y) * size.1 as f32]
+        };
+        for (p, m) in floats(view.gbuffer.position())
+            .iter()
+            .zip(floats(view.gbuffer.motion()))
+        {
+            let image = Vec3::new(plane - p[0], p[1], p[2]);
+            let (now, then) = (project(&before, image), project(&old, image));
+            for c in 0..2 {
+                assert!((then[c] - now[c] - m[c]).abs() < 0.1, "{image}: {m:?}");
+            }
+        }
+    });
+}

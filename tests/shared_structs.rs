@@ -6,8 +6,8 @@ use q3rays::render::frame_constants::{FrameConstants, Push};
 use q3rays::render::reservoirs::Reservoir;
 use q3rays::render::strata::Stratum;
 use q3rays::scene::records::{
-    AmbientCube, BspNode, CellEntry, Deform, DynamicTriangle, Instance, Light, LightCell, LightNode, LightRow,
-    LightRun, Material, RestVertex, Stage, TcMod, TextureInfo, Triangle, VertexAttributes, Wave,
+    AmbientCube, BspNode, CellEntry, Deform, DynamicTriangle, Fog, Instance, Light, LightCell, LightNode, LightRow,
+    LightRun, Material, Portal, RestVertex, Stage, TcMod, TextureInfo, Triangle, VertexAttributes, Wave,
 };
 use std::collections::{BTreeMap, HashMap};
 use std::mem::offset_of;
@@ -135,6 +135,18 @@ fn records() -> Vec<Record> {
             b,
             direction,
             wave
+        }),
+        record!(Portal {
+            surface,
+            mirror,
+            there,
+            back
+        }),
+        record!(Fog {
+            colour,
+            density,
+            first_plane,
+            plane_count
         }),
         record!(RestVertex {
             position,
@@ -270,6 +282,9 @@ fn records() -> Vec<Record> {
             tc_mods,
             deforms,
             rest_vertices,
+            fogs,
+            fog_planes,
+            portals,
             dynamic_triangles,
             instances,
             lights,
@@ -358,7 +373,9 @@ fn records() -> Vec<Record> {
             old_clock,
             first_dynamic_vertex,
             dynamic_triangles_count,
-            padding
+            fog_count,
+            portal_count,
+            max_depth
         }),
         record!(Push {
             frame,

@@ -30,6 +30,7 @@ const uint MATERIAL_FILTER = 128;
 const uint MATERIAL_BACK = 256;
 const uint MATERIAL_NO_FRONT = 512;
 const uint MATERIAL_MOVING_EMISSION = 1024;
+const uint MATERIAL_PORTAL = 2048;
 
 struct Material {
     uint texture_index;
@@ -84,6 +85,20 @@ struct RestVertex {
     vec3 normal;
     uint quad;
     uint material;
+};
+
+struct Portal {
+    uint surface;
+    uint mirror;
+    vec4 there[3];
+    vec4 back[3];
+};
+
+struct Fog {
+    vec3 colour;
+    float density;
+    uint first_plane;
+    uint plane_count;
 };
 
 struct DynamicTriangle {
@@ -293,6 +308,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Mat
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Deforms { Deform at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RestVertices { RestVertex at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DynamicTriangles { DynamicTriangle at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Portals { Portal at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Fogs { Fog at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FogPlanes { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Stages { Stage at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer TcMods { TcMod at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Instances { Instance at[]; };
@@ -324,6 +342,9 @@ struct FrameConstants {
     TcMods tc_mods;
     Deforms deforms;
     RestVertices rest_vertices;
+    Fogs fogs;
+    FogPlanes fog_planes;
+    Portals portals;
     DynamicTriangles dynamic_triangles;
     Instances instances;
     Lights lights;
@@ -412,7 +433,9 @@ struct FrameConstants {
     uint old_clock;
     uint first_dynamic_vertex;
     uint dynamic_triangles_count;
-    uint padding;
+    uint fog_count;
+    uint portal_count;
+    uint max_depth;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

@@ -108,6 +108,13 @@ pub const CVARS: &[Cvar] = &[
         1,
         "1 samples the area of lights, 0 their centre only (an approximation with hard shadows)",
     ),
+    int(
+        "rt_maxDepth",
+        5,
+        1,
+        16,
+        "mirrors and portals that a ray goes through at most",
+    ),
     int("rt_antialiasing", 1, 0, 1, "jitters the ray within the pixel"),
     int("rt_dof", 0, 0, 1, "depth of field through a thin lens"),
     float("rt_aperture", 1.0, 0.0, 64.0, "lens radius for rt_dof, units"),

@@ -74,6 +74,7 @@ pub fn settings(cvars: &Cvars) -> Settings {
         } else {
             ShownEmission::Game
         },
+        max_depth: number("rt_maxDepth") as u32,
         choose_layers: true,
         clock: Clock::default(),
     }

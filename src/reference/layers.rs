@@ -6,6 +6,7 @@
 //! can contribute.
 
 use super::direct::SampleAddress;
+use super::portal::go_through;
 use super::primary::CameraRay;
 use super::surface::{SurfaceHit, drawn, emission_seen, surface_at};
 use super::trace::{Hit, Tracer};
@@ -13,7 +14,7 @@ use super::visibility::ON_RECEIVER;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::light_power::luminance;
-use crate::scene::records::MATERIAL_LAYER;
+use crate::scene::records::{MATERIAL_LAYER, MATERIAL_PORTAL};
 use crate::scene::sampling::{DIM_LAYER, bits2, key, unit};
 use glam::Vec3;
 
@@ -41,8 +42,10 @@ pub struct Seen {
 struct Pending {
     surface: SurfaceHit,
     hit: Hit,
-    /// Share of light from before it that comes through.
+    /// Share of light from before it that comes through layers.
     share: Vec3,
+    /// What fog leaves of that.
+    fog: f32,
 }
 
 /// Follows a camera ray. `cone`: width of the ray's cone at distance 1.
@@ -60,30 +63,40 @@ pub fn see(
         emission: Vec3::ZERO,
         layers: Vec3::ZERO,
     };
+    let mut ray = ray;
+    // Way of the legs before, units, and the mirrors and portals gone through.
+    let mut travelled = 0.0;
+    let mut depth = 0;
     let mut pending: Option<Pending> = None;
     let mut after = None;
     let mut dimension = DIM_LAYER;
+    // Fog on the way to the last surface, and what it leaves.
+    let mut fog = (Vec3::ZERO, 1.0);
     for _ in 0..MOST_LAYERS {
         let hit = tracer.next(scene, ray.origin, ray.direction, FAR, after);
         let Some(hit) = hit.filter(|_| out.share.max_element() > LEAST_SHARE) else {
             // Nothing behind: the layer takes all.
             if let Some(p) = pending {
                 out.surface = Some((p.surface, p.hit));
-                out.share = p.share;
+                out.share = p.share * p.fog;
             }
             return out;
         };
         after = Some(hit);
         let material = &scene.materials[scene.geometry.triangles[hit.triangle as usize].material as usize];
-        let surface = surface_at(scene, tracer, &hit, ray.direction, cone);
+        let wide = cone * (1.0 + travelled / hit.t as f32);
+        let surface = surface_at(scene, tracer, &hit, ray.direction, wide);
         if !drawn(material, surface.front) {
             continue;
         }
         let layer = material.flags & MATERIAL_LAYER != 0;
+        let there = scene.fogs.at(ray.origin, ray.direction, hit.t as f32);
+        out.layers += out.share * (there.0 - fog.0);
+        fog = there;
         if let Some(p) = pending {
             if !layer && (hit.t - p.hit.t) as f32 <= ON_RECEIVER {
                 out.surface = Some((folded(&p.surface, &surface), hit));
-                out.share = p.share;
+                out.share = p.share * fog.1;
                 out.emission =
                     p.surface.through * emission_seen(scene, &surface, ray.direction, settings.shown_emission);
                 return out;
@@ -99,7 +112,7 @@ pub fn see(
             dimension += 1;
             if settings.choose_layers && unit(bits) < chance {
                 out.surface = Some((p.surface, p.hit));
-                out.share = p.share / chance;
+                out.share = p.share * p.fog / chance;
                 return out;
             }
             if settings.choose_layers {
@@ -111,14 +124,29 @@ pub fn see(
         if !layer {
             out.surface = Some((surface, hit));
             out.emission = emission;
+            out.share *= fog.1;
             return out;
         }
-        out.layers += out.share * emission;
+        out.layers += out.share * emission * fog.1;
+        if material.flags & MATERIAL_PORTAL != 0 {
+            out.share *= surface.through * fog.1;
+            depth += 1;
+            if depth > settings.max_depth {
+                return out;
+            }
+            let number = scene.geometry.triangles[hit.triangle as usize].surface;
+            ray = go_through(scene, number, &surface, ray.direction);
+            travelled += hit.t as f32;
+            after = None;
+            fog = (Vec3::ZERO, 1.0);
+            continue;
+        }
         if surface.albedo != Vec3::ZERO {
             pending = Some(Pending {
                 surface,
                 hit,
                 share: out.share,
+                fog: fog.1,
             });
         }
         out.share *= surface.through;

@@ -8,6 +8,7 @@ pub mod layers;
 pub mod light_cells;
 pub mod light_choice;
 pub mod light_sample;
+pub mod portal;
 pub mod primary;
 pub mod program;
 pub mod renderer;

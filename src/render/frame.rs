@@ -257,6 +257,7 @@ fn frame_constants(
         exposure_blend: input.exposure_blend,
         clock: s.clock.0,
         shown_emission: s.shown_emission as u32,
+        max_depth: s.max_depth,
         choose_layers: u32::from(s.choose_layers),
         ..base
     })

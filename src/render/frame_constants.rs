@@ -15,6 +15,9 @@ pub struct FrameConstants {
     pub tc_mods: u64,
     pub deforms: u64,
     pub rest_vertices: u64,
+    pub fogs: u64,
+    pub fog_planes: u64,
+    pub portals: u64,
     pub dynamic_triangles: u64,
     pub instances: u64,
     pub lights: u64,
@@ -135,7 +138,10 @@ pub struct FrameConstants {
     pub old_clock: u32,
     pub first_dynamic_vertex: u32,
     pub dynamic_triangles_count: u32,
-    pub padding: u32,
+    pub fog_count: u32,
+    pub portal_count: u32,
+    /// Mirrors and portals that a ray goes through at most.
+    pub max_depth: u32,
 }
 
 /// Push constants of every pass.

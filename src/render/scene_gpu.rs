@@ -99,6 +99,11 @@ pub struct SceneGpu {
     pub stages: Buffer,
     pub tc_mods: Buffer,
     pub deforms: Buffer,
+    pub fogs: Buffer,
+    pub fog_planes: Buffer,
+    fog_count: u32,
+    pub portals: Buffer,
+    portal_count: u32,
     pub rest_vertices: Buffer,
     pub dynamic_triangles: Buffer,
     pub dynamic_triangles_count: u32,
@@ -216,6 +221,9 @@ impl SceneGpu {
         let stages = buffer!("stages", &scene.tables.stages, none);
         let tc_mods = buffer!("texture coordinate changes", &scene.tables.tc_mods, none);
         let deforms = buffer!("deforms", &scene.tables.deforms, none);
+        let fogs = buffer!("fogs", &scene.fogs.fogs, none);
+        let fog_planes = buffer!("fog planes", &scene.fogs.planes, none);
+        let portals = buffer!("portals", &scene.portals, none);
         let rest_vertices = buffer!("rest vertices", &g.dynamic.rest, none);
         let dynamic_triangles = buffer!("dynamic triangles", &trees.dynamic, none);
         let instance_records = buffer!("instances", &instances, none);
@@ -315,6 +323,11 @@ impl SceneGpu {
             stages: take(stages)?,
             tc_mods: take(tc_mods)?,
             deforms: take(deforms)?,
+            fogs: take(fogs)?,
+            fog_planes: take(fog_planes)?,
+            portals: take(portals)?,
+            portal_count: scene.portals.len() as u32,
+            fog_count: scene.fogs.fogs.len() as u32,
             rest_vertices: take(rest_vertices)?,
             dynamic_triangles: take(dynamic_triangles)?,
             dynamic_triangles_count: trees.dynamic.len() as u32,
@@ -415,6 +428,11 @@ impl SceneGpu {
             stages: self.stages.address(),
             tc_mods: self.tc_mods.address(),
             deforms: self.deforms.address(),
+            fogs: self.fogs.address(),
+            fog_planes: self.fog_planes.address(),
+            fog_count: self.fog_count,
+            portals: self.portals.address(),
+            portal_count: self.portal_count,
             rest_vertices: self.rest_vertices.address(),
             dynamic_triangles: self.dynamic_triangles.address(),
             dynamic_triangles_count: self.dynamic_triangles_count,

@@ -102,6 +102,8 @@ pub struct Settings {
     /// Select texture levels by the ray's footprint; else level 0.
     pub filter_textures: bool,
     pub shown_emission: ShownEmission,
+    /// Mirrors and portals that a ray goes through at most.
+    pub max_depth: u32,
     /// Shade lit layers, one of them and what is behind at random; else only what is behind.
     pub choose_layers: bool,
     /// The scene's time.
@@ -165,6 +167,7 @@ impl Default for Settings {
             taa_gamma: 2.0,
             filter_textures: true,
             shown_emission: ShownEmission::Game,
+            max_depth: 5,
             choose_layers: true,
             clock: Clock::default(),
         }

@@ -54,7 +54,8 @@ pub fn item_placements(item: &PlacedItem, meshes: [Option<u32>; 2], middles: [Ve
         .collect()
 }
 
-fn rows(m: Affine3A) -> [[f32; 4]; 3] {
+/// An affine map as three rows of four.
+pub fn rows(m: Affine3A) -> [[f32; 4]; 3] {
     let (x, y, z, t) = (m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis, m.translation);
     [[x.x, y.x, z.x, t.x], [x.y, y.y, z.y, t.y], [x.z, y.z, z.z, t.z]]
 }

@@ -4,13 +4,15 @@ use super::ambient::Ambient;
 use super::clock::Clock;
 use super::clusters::{ClusterMap, LightRows, bsp_records, build_light_rows};
 use super::entity_geometry::{self, Placement};
+use super::fog::Fogs;
 use super::items;
 use super::light_cells::LightCells;
 use super::lights::{LightInputs, LightTable};
 use super::material::{MaterialSource, Tables};
 use super::models::Models;
 use super::motion::Motion;
-use super::records::{BspNode, Material};
+use super::portals;
+use super::records::{BspNode, Material, Portal};
 use super::spawns::{Spawn, spawns};
 use super::static_geometry::{self, Geometry};
 use super::textures::TextureRequests;
@@ -47,6 +49,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// What materials point into.
     pub tables: Tables,
+    pub fogs: Fogs,
+    pub portals: Vec<Portal>,
     pub geometry: Geometry,
     /// Where meshes stand; placement 0 is the world.
     pub placements: Vec<Placement>,
@@ -160,6 +164,8 @@ impl Scene {
             .map(|m| m.record(&textures, &mut tables))
             .collect();
         watch.lap("textures");
+        let portals = portals::portals(&bsp, &entities, &material_sources);
+        let fogs = Fogs::new(&bsp, &scripts);
         let emits: Vec<bool> = material_sources.iter().map(|m| m.surface_light().is_some()).collect();
         let mut geometry = static_geometry::build(&bsp, &material_sources, &emits, &models);
         if geometry.meshes.is_empty() {
@@ -209,6 +215,8 @@ impl Scene {
             material_sources,
             materials,
             tables,
+            fogs,
+            portals,
             geometry,
             placements,
             lights,

@@ -7,7 +7,7 @@ use super::emission::{Emission, emission_colour, normalised, normalised_texture}
 use super::program::{Program, UNLIT};
 use super::records::{
     Deform, MATERIAL_ALPHA_TESTED, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_FILTER, MATERIAL_LAYER,
-    MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES,
+    MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_PORTAL, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES,
     MATERIAL_TWO_SIDED_EMISSION, Material, NONE, Stage as StageRecord, TcMod,
 };
 use super::textures::{CHECKER, TextureRequests, WHITE};
@@ -74,6 +74,8 @@ pub struct MaterialSource {
     /// Distance along its normals that a surface stands off its place, units.
     pub lift: f32,
     pub program: Program,
+    /// A mirror or portal.
+    pub portal: bool,
     /// Changes of the geometry.
     pub deforms: Vec<Deform>,
     /// Height of a sky's clouds, units.
@@ -180,6 +182,7 @@ impl MaterialSource {
                 cull: Cull::FrontSided,
                 lift: 0.0,
                 program: Program::default(),
+                portal: false,
                 deforms: Vec::new(),
                 cloud_height: SkyParms::DEFAULT_CLOUD_HEIGHT,
                 emission: None,
@@ -231,6 +234,7 @@ impl MaterialSource {
             cull: shader.cull,
             lift: lift(shader, visibility),
             program,
+            portal: shader.portal && visibility == Visibility::Layer,
             deforms: shader.deforms.iter().filter_map(dynamic_geometry::record).collect(),
             cloud_height: shader
                 .sky
@@ -320,6 +324,9 @@ impl MaterialSource {
                 AlphaFunc::Lt128 => (-1.0, 0.5),
                 AlphaFunc::Ge128 => (1.0, -0.5 + 0.5 / 255.0),
             };
+        }
+        if self.portal {
+            record.flags |= MATERIAL_PORTAL;
         }
         if self.two_sided {
             record.flags |= MATERIAL_TWO_SIDED_EMISSION;

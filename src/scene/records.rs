@@ -53,6 +53,8 @@ pub const MATERIAL_FILTER: u32 = 128;
 pub const MATERIAL_BACK: u32 = 256;
 /// `Material::flags`: not drawn seen from the front.
 pub const MATERIAL_NO_FRONT: u32 = 512;
+/// `Material::flags`: a mirror or portal: a layer before what is seen in it.
+pub const MATERIAL_PORTAL: u32 = 2048;
 /// `Material::flags`: emission is that of its stages as the clock has them.
 pub const MATERIAL_MOVING_EMISSION: u32 = 1024;
 
@@ -111,6 +113,32 @@ pub struct Deform {
     pub b: f32,
     pub direction: [f32; 3],
     pub wave: Wave,
+}
+
+/// A surface of a mirror or portal.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Portal {
+    /// Surface of the map file.
+    pub surface: u32,
+    /// 1: a mirror; the maps are not used.
+    pub mirror: u32,
+    /// World before the portal to world at its camera, three rows of four.
+    pub there: [[f32; 4]; 3],
+    /// The other way.
+    pub back: [[f32; 4]; 3],
+}
+
+/// A volume of fog.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Fog {
+    /// Radiance where it hides everything.
+    pub colour: [f32; 3],
+    /// Inverse of the way through it that hides everything, 1/units.
+    pub density: f32,
+    pub first_plane: u32,
+    pub plane_count: u32,
 }
 
 /// A vertex of dynamic geometry as modelled.
