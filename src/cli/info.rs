@@ -102,6 +102,7 @@ impl Display for Text<'_> {
             r.receivers.all_lights * 100.0
         )?;
         list(f, "materials", &r.materials)?;
+        list(f, "features", &r.features)?;
         writeln!(
             f,
             "{:12} {} ({:.1} MiB with mips); {} materials without a script",

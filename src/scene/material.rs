@@ -24,6 +24,9 @@ const SKY_SIDES: [&str; 6] = ["rt", "lf", "bk", "ft", "up", "dn"];
 /// shares its place with a wall, and rays must meet the two in that order.
 const LIFT: f32 = 1.0 / 64.0;
 
+/// Radiance at which a lamp is shown whose script has no stage that shines, luxel units: well over what it lights.
+const UNSTAGED_LAMP: f32 = 4.0 * UNLIT;
+
 /// The compiler's `q3map_backsplash` where a script has none.
 const BACKSPLASH: [f32; 2] = [5.0, 23.0];
 
@@ -282,6 +285,16 @@ impl MaterialSource {
         self.colour
     }
 
+    /// Has an alpha test.
+    pub fn tests_alpha(&self) -> bool {
+        self.alpha_func.is_some()
+    }
+
+    /// Is drawn on other sides than its front alone.
+    pub fn culls_otherwise(&self) -> bool {
+        self.cull != Cull::FrontSided
+    }
+
     /// What the surface emits.
     pub fn emission(&self) -> Option<Emission> {
         let source = self.emission?;
@@ -380,9 +393,7 @@ impl MaterialSource {
             let (scaled, texture) = normalised_texture(emission, textures);
             record.emission = scaled.into();
             record.emission_texture = texture.unwrap_or(NONE);
-            if texture.is_none() {
-                record.shown = emission.radiance.min(self.colour * UNLIT).into();
-            }
+            record.shown = scaled.min(Vec3::splat(UNSTAGED_LAMP)).into();
             return;
         }
         let Some(scaled) = normalised(emission.radiance, self.program.mean_emission(textures)) else {

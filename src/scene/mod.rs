@@ -8,6 +8,7 @@ pub mod clusters;
 pub mod dynamic_geometry;
 pub mod emission;
 pub mod entity_geometry;
+pub mod features;
 pub mod fog;
 pub mod items;
 pub mod light_cells;

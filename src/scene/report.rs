@@ -46,6 +46,8 @@ pub struct Report {
     /// Mean over clusters of lights in the row / all lights, at culling levels 1 and 2.
     pub row_share: [f64; 2],
     pub materials: BTreeMap<&'static str, usize>,
+    /// Materials by what they use of the shader language.
+    pub features: BTreeMap<&'static str, usize>,
     pub unscripted_materials: usize,
     pub textures: usize,
     pub texture_bytes: usize,
@@ -159,6 +161,7 @@ impl Report {
                 Visibility::Layer => "layer",
                 Visibility::Invisible => "invisible",
             })),
+            features: super::features::features(scene),
             unscripted_materials: scene.material_sources.iter().filter(|m| !m.scripted).count(),
             textures: scene.textures.len(),
             texture_bytes: scene.textures.iter().flat_map(|t| &t.levels).map(|l| l.len() * 4).sum(),
