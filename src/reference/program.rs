@@ -3,8 +3,9 @@
 use super::texture::{sample, sample_encoded};
 use crate::assets::image::decode_srgb;
 use crate::scene::Scene;
+use crate::scene::blending::{Blending, Shade};
 use crate::scene::clock::Clock;
-use crate::scene::program::{Blending, OVERBRIGHT, Shade, wave_at};
+use crate::scene::program::{OVERBRIGHT, wave_at};
 use crate::scene::records::*;
 use glam::{Mat2, Vec2, Vec3, Vec4, Vec4Swizzles};
 use std::f32::consts::TAU;

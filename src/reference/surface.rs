@@ -5,9 +5,10 @@ use super::texture::{sample, uv_at};
 use super::trace::{Hit, Tracer, point_to_world};
 use crate::render::settings::ShownEmission;
 use crate::scene::Scene;
+use crate::scene::blending::Shade;
 use crate::scene::clock::Clock;
 use crate::scene::clusters::{NUDGES, cluster_at};
-use crate::scene::program::{Shade, UNLIT};
+use crate::scene::program::UNLIT;
 use crate::scene::records::{
     Instance, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_LAYER, MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_SKY,
     MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION, Material, NONE,

@@ -6,6 +6,7 @@ pub mod bvh_upload;
 pub mod composite;
 pub mod deform;
 pub mod direct;
+pub mod driver_structures;
 pub mod exposure;
 pub mod film;
 pub mod focus;

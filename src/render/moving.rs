@@ -3,7 +3,7 @@
 
 use super::bvh_upload::instance_tree;
 use super::frame_constants::FrameConstants;
-use super::scene_gpu::{SceneGpu, placed_instances};
+use super::scene_gpu::SceneGpu;
 use crate::gpu::acceleration::{TopInstance, TopLevel};
 use crate::gpu::{Access, Buffer, Commands, DescriptorSets, GpuError, MemoryKind, Tracker, Use, Write};
 use crate::scene::clock::Clock;
@@ -84,7 +84,7 @@ impl Moving {
             self.nodes[slot].write(0, &tree.nodes)?;
         }
         if let Some(driver) = &scene.driver {
-            self.placed = placed_instances(driver, &records);
+            self.placed = driver.placed(&records);
         }
         Ok(FrameConstants {
             instances: self.instances[slot].address(),

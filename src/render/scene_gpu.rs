@@ -2,12 +2,10 @@
 
 use super::backend::Backend;
 use super::bvh_upload::{MeshTrees, TreeError, instance_tree};
+use super::driver_structures::{self, DriverStructures};
 use super::frame_constants::FrameConstants;
 use super::history::Moving;
 use crate::assets::image::SRGB_TO_LINEAR;
-use crate::gpu::acceleration::{
-    BottomDesc, BottomLevel, BuildPreference, BuildStatistics, Refit, Scratch, TopInstance, TopLevel, TriangleGeometry,
-};
 use crate::gpu::{
     Binding, BindingKind, Buffer, DescriptorLayout, DescriptorSets, Device, GpuError, Image, ImageDesc, MemoryKind,
     SampledTexture, Sampler, SamplerDesc, UploadBatch, Write,
@@ -61,31 +59,6 @@ pub struct BvhBuffers {
     pub bvh2_triangles: Buffer,
     pub instance_nodes: Buffer,
     pub instance_root: u32,
-}
-
-/// Structures of the driver's traversal.
-pub struct DriverStructures {
-    _index_buffer: Buffer,
-    /// One of each mesh that has triangles.
-    bottom: Vec<Option<BottomLevel>>,
-    pub top: TopLevel,
-    pub statistics: BuildStatistics,
-    /// The dynamic mesh, where there is one.
-    pub refit: Option<DynamicRefit>,
-}
-
-/// What refits the driver's structure over the dynamic mesh.
-pub struct DynamicRefit {
-    pub mesh: u32,
-    pub geometries: Vec<TriangleGeometry>,
-    pub scratch: Scratch,
-}
-
-impl DriverStructures {
-    /// The bottom level of a mesh.
-    pub fn bottom(&self, mesh: u32) -> Option<&BottomLevel> {
-        self.bottom.get(mesh as usize)?.as_ref()
-    }
 }
 
 /// Everything of a scene that shaders read.
@@ -288,7 +261,7 @@ impl SceneGpu {
         batch.finish()?;
 
         let driver = match backend {
-            Backend::RayQuery => Some(build_driver_structures(
+            Backend::RayQuery => Some(driver_structures::build(
                 device,
                 scene,
                 &instances,
@@ -304,13 +277,7 @@ impl SceneGpu {
                 .ok_or_else(|| GpuError::InvalidInput("a scene buffer is used twice".into()))
         };
         let index_buffer = take(index_buffer)?;
-        let driver = driver.map(|built| DriverStructures {
-            _index_buffer: index_buffer,
-            bottom: built.bottom,
-            top: built.top,
-            statistics: built.statistics,
-            refit: built.refit,
-        });
+        let driver = driver.map(|built| built.keeping(index_buffer));
         let sampler = Sampler::new(device, "texels", &SamplerDesc::default())?;
         let (layout, sets) = scene_set(device, backend, driver.as_ref(), &textures, &sampler)?;
         Ok(Self {
@@ -517,107 +484,4 @@ fn texture_sets(
     let sampled: Vec<_> = textures.iter().map(|image| SampledTexture { image, sampler }).collect();
     sets.write(0, &[Write::textures(1, 0, &sampled)])?;
     Ok(sets)
-}
-
-/// What a top level is built of: instances of meshes that have triangles.
-pub fn placed_instances(driver: &DriverStructures, instances: &[Instance]) -> Vec<TopInstance> {
-    placed(&driver.bottom, instances)
-}
-
-fn placed(bottom: &[Option<BottomLevel>], instances: &[Instance]) -> Vec<TopInstance> {
-    instances
-        .iter()
-        .enumerate()
-        .filter_map(|(index, instance)| {
-            let level = bottom[instance.mesh as usize].as_ref()?;
-            Some(TopInstance {
-                transform: instance.object_to_world,
-                ..TopInstance::new(level, index as u32)
-            })
-        })
-        .collect()
-}
-
-/// Structures before they have the buffer that they were built from.
-struct BuiltStructures {
-    bottom: Vec<Option<BottomLevel>>,
-    top: TopLevel,
-    statistics: BuildStatistics,
-    refit: Option<DynamicRefit>,
-}
-
-/// Geometry 0 of every bottom level is opaque, geometry 1 alpha-tested; a mesh without triangles is not placed.
-fn build_driver_structures(
-    device: &Arc<Device>,
-    scene: &Scene,
-    instances: &[Instance],
-    positions: &Buffer,
-    indices: &Buffer,
-) -> Result<BuiltStructures, GpuError> {
-    let g = &scene.geometry;
-    let used: Vec<usize> = (0..g.meshes.len())
-        .filter(|&m| g.meshes[m].triangle_count > 0)
-        .collect();
-    let geometries: Vec<Vec<TriangleGeometry>> = used
-        .iter()
-        .map(|&m| {
-            let mesh = &g.meshes[m];
-            let part = |first: u32, count: u32, opaque: bool| TriangleGeometry {
-                vertices: positions.address(),
-                vertex_stride: 12,
-                vertex_count: g.positions.len() as u32,
-                indices: indices.address() + u64::from(mesh.first_triangle + first) * 12,
-                triangle_count: count,
-                opaque,
-            };
-            vec![
-                part(0, mesh.opaque_count, true),
-                part(mesh.opaque_count, mesh.triangle_count - mesh.opaque_count, false),
-            ]
-        })
-        .collect();
-    let descriptions: Vec<BottomDesc<'_>> = geometries
-        .iter()
-        .zip(&used)
-        .map(|(geometries, &mesh)| {
-            let moves = !g.dynamic.rest.is_empty() && mesh == g.dynamic.mesh as usize;
-            BottomDesc {
-                name: "mesh",
-                geometries,
-                preference: BuildPreference::FastTrace,
-                allow_update: moves,
-                compact: !moves,
-            }
-        })
-        .collect();
-    let (bottom, statistics) = BottomLevel::build(device, &descriptions)?;
-    let mut levels: Vec<Option<BottomLevel>> = (0..g.meshes.len()).map(|_| None).collect();
-    let mut refit = None;
-    for ((mesh, level), geometries) in used.into_iter().zip(bottom).zip(&geometries) {
-        if !g.dynamic.rest.is_empty() && mesh == g.dynamic.mesh as usize {
-            let one = Refit {
-                bottom: &level,
-                geometries,
-                rebuild: false,
-            };
-            refit = Some(DynamicRefit {
-                mesh: mesh as u32,
-                scratch: Scratch::new(device, BottomLevel::refit_scratch_bytes(device, &[one]))?,
-                geometries: geometries.clone(),
-            });
-        }
-        levels[mesh] = Some(level);
-    }
-    let placed = placed(&levels, instances);
-    let mut top = TopLevel::new(device, "top level", placed.len().max(1) as u32, 1)?;
-    device.submit_once("top level", |cmd| {
-        top.record_build(cmd, &placed, 0)?;
-        Ok(())
-    })?;
-    Ok(BuiltStructures {
-        bottom: levels,
-        top,
-        statistics,
-        refit,
-    })
 }

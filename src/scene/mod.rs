@@ -1,6 +1,7 @@
 //! What is rendered: triangles, materials, lights, clusters and views.
 
 pub mod ambient;
+pub mod blending;
 pub mod bvh;
 pub mod camera;
 pub mod clock;
