@@ -5,7 +5,7 @@ mod common;
 mod gpu_fixture;
 
 use common::analytic::sunlit;
-use common::{camera, gpu_film, real, scene, spawn_camera};
+use common::{camera, gpu_film, project, real, scene, spawn_camera};
 use glam::Vec3;
 use gpu_fixture::with_device;
 use q3rays::gpu::Image;
@@ -351,21 +351,13 @@ fn motion_vectors_are_where_the_points_were() {
             bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect()
         };
         let (positions, motions) = (floats(view.gbuffer.position()), floats(view.gbuffer.motion()));
-        let project = |c: &Camera, p: Vec3| {
-            let (axes, (w, h)) = (c.axes(), c.half_extent(SIZE.0, SIZE.1));
-            let d = p - Vec3::from(c.eye);
-            let depth = d.dot(axes.forward);
-            let x = d.dot(axes.right) / depth / w;
-            let y = d.dot(axes.up) / depth / h;
-            [(0.5 + 0.5 * x) * SIZE.0 as f32, (0.5 - 0.5 * y) * SIZE.1 as f32]
-        };
         let mut seen = 0;
         for (p, m) in positions.iter().zip(&motions) {
             let point = Vec3::new(p[0], p[1], p[2]);
             if p[3] <= 0.0 || (point - Vec3::from(old.eye)).dot(old.axes().forward) < 1.0 {
                 continue;
             }
-            let (now, before) = (project(&camera, point), project(&old, point));
+            let (now, before) = (project(&camera, SIZE, point), project(&old, SIZE, point));
             for c in 0..2 {
                 assert!((before[c] - now[c] - m[c]).abs() < 0.1, "{point}: {m:?}");
             }

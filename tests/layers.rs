@@ -5,7 +5,7 @@ mod common;
 mod gpu_fixture;
 
 use common::analytic::boxed;
-use common::{camera, gpu_film, quiet, scene};
+use common::{camera, gpu_film, project, quiet, scene};
 use glam::Vec3;
 use gpu_fixture::with_device;
 use q3rays::assets::bsp::build::fixtures::Fixture;
@@ -267,13 +267,6 @@ fn moved_points(gpu: &SceneGpu, scene: &Scene, size: (u32, u32)) {
         q3rays::scene::dynamic_geometry::all(g, &scene.materials, &scene.tables.deforms, clock, eye)
     };
     let [before, now] = moments.map(at);
-    let project = |p: Vec3| {
-        let (axes, (w, h)) = (view_camera.axes(), view_camera.half_extent(size.0, size.1));
-        let d = p - eye;
-        let depth = d.dot(axes.forward);
-        let (x, y) = (d.dot(axes.right) / depth / w, d.dot(axes.up) / depth / h);
-        [(0.5 + 0.5 * x) * size.0 as f32, (0.5 - 0.5 * y) * size.1 as f32]
-    };
     let first = scene.geometry.dynamic.vertices.start;
     let (mut seen, mut moved) = (0, 0);
     for (o, m) in objects.iter().zip(&motions) {
@@ -288,7 +281,10 @@ fn moved_points(gpu: &SceneGpu, scene: &Scene, size: (u32, u32)) {
             let [a, b, c] = t.vertices.map(|v| vertices[(v - first) as usize].position);
             a * (1.0 - b1 - b2) + b * b1 + c * b2
         };
-        let (old, new) = (project(point(&before)), project(point(&now)));
+        let (old, new) = (
+            project(&view_camera, size, point(&before)),
+            project(&view_camera, size, point(&now)),
+        );
         for c in 0..2 {
             let motion = f32::from_bits(m[c]);
             assert!(
@@ -374,19 +370,12 @@ fn a_mirror_shows_what_an_eye_behind_it_sees() {
             let bytes = image.read_back(0).unwrap();
             bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect()
         };
-        let project = |c: &q3rays::scene::camera::Camera, p: Vec3| {
-            let (axes, (w, h)) = (c.axes(), c.half_extent(size.0, size.1));
-            let d = p - Vec3::from(c.eye);
-            let depth = d.dot(axes.forward);
-            let (x, y) = (d.dot(axes.right) / depth / w, d.dot(axes.up) / depth / h);
-            [(0.5 + 0.5 * x) * size.0 as f32, (0.5 - 0.5 * y) * size.1 as f32]
-        };
         for (p, m) in floats(view.gbuffer.position())
             .iter()
             .zip(floats(view.gbuffer.motion()))
         {
             let image = Vec3::new(plane - p[0], p[1], p[2]);
-            let (now, then) = (project(&before, image), project(&old, image));
+            let (now, then) = (project(&before, size, image), project(&old, size, image));
             for c in 0..2 {
                 assert!((then[c] - now[c] - m[c]).abs() < 0.1, "{image}: {m:?}");
             }

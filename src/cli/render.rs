@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     time: Option<f64>,
     /// Frames per second of the scene clock; without it the clock stands still
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", value_parser = parse_rate)]
     fps: Option<f64>,
     /// Write times per frame: .json or .csv
     #[arg(long, value_name = "FILE")]
@@ -68,6 +68,14 @@ pub struct Args {
 
 /// Largest image edge, pixels: what random-number addresses and GPUs hold.
 const MAX_EDGE: u32 = 16_384;
+
+/// Parses a frame rate.
+fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
+        _ => Err("expected frames per second above 0, such as 60".to_owned()),
+    }
+}
 
 /// Parses `WxH`.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {

@@ -95,6 +95,15 @@ pub fn still(random_lights: u32, sequence: Sequence, seed: u32) -> Settings {
     }
 }
 
+/// Where a world point is in the image, pixels from the top left.
+pub fn project(camera: &Camera, size: (u32, u32), point: Vec3) -> [f32; 2] {
+    let (axes, (w, h)) = (camera.axes(), camera.half_extent(size.0, size.1));
+    let d = point - Vec3::from(camera.eye);
+    let depth = d.dot(axes.forward);
+    let (x, y) = (d.dot(axes.right) / depth / w, d.dot(axes.up) / depth / h);
+    [(0.5 + 0.5 * x) * size.0 as f32, (0.5 - 0.5 * y) * size.1 as f32]
+}
+
 /// No progress wanted.
 pub fn quiet(_: f32) {}
 
