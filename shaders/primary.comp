@@ -29,13 +29,32 @@ vec3 old_position_of(Instance i, Hit hit) {
     return vec3(dot(i.old_object_to_world[0], q), dot(i.old_object_to_world[1], q), dot(i.old_object_to_world[2], q));
 }
 
-void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, FC.size))) return;
+// Pixels of the work group of which something branches off, and the first one's place among all.
+shared uint group_pixels;
+shared uint group_first;
+
+// Lists a pixel for the secondary stage. To be called by every thread of the group.
+void list_pixel(uvec2 pixel, bool branches) {
+    if (gl_LocalInvocationIndex == 0) group_pixels = 0;
+    barrier();
+    uint place = branches ? atomicAdd(group_pixels, 1) : 0;
+    barrier();
+    if (gl_LocalInvocationIndex == 0 && group_pixels != 0) {
+        group_first = atomicAdd(FC.secondary_pixels.count, group_pixels);
+        atomicMax(FC.secondary_pixels.groups[0], (group_first + group_pixels + 63) / 64);
+    }
+    barrier();
+    if (branches) FC.secondary_pixels.at[group_first + place] = pixel.x + (pixel.y << 16);
+}
+
+// True where something branches off.
+bool shoot(uvec2 pixel) {
     ivec2 p = ivec2(pixel);
     vec3 origin, direction;
     camera_ray(pixel, sample_index, origin, direction);
-    Seen seen = see(origin, direction, pixel.x + (pixel.y << 16));
+    Seen seen = see(Path(origin, direction, vec3(1.0), 0.0, 0, pixel.x + (pixel.y << 16), -1.0, 0));
+    bool branches = branch_count != 0;
+    if (FC.view == 23) imageStore(image_secondary, p, vec4(0.0));
     Hit hit = seen.hit;
     imageStore(gbuffer_view, p, vec4(direction, 0.0));
     imageStore(image_layers, p, vec4(seen.layers, 0.0));
@@ -48,7 +67,7 @@ void main() {
         imageStore(image_emission, p, vec4(0.0));
         imageStore(gbuffer_motion, p, vec4(motion_of_direction(direction), 0.0, 0.0));
         imageStore(guide, p, uvec4(0));
-        return;
+        return branches;
     }
     SurfaceHit s = seen.surface;
     imageStore(gbuffer_albedo, p, vec4(s.albedo, 1.0));
@@ -72,4 +91,11 @@ void main() {
     imageStore(gbuffer_motion, p, vec4(motion, seen.distance, dot(old_position - FC.old_eye, FC.old_forward)));
     float depth = s.albedo == vec3(0.0) ? 0.0 : dot(place - FC.eye, FC.forward);
     imageStore(guide, p, pack_guide(depth, to_view(normal), s.material, hit.instance));
+    return branches;
+}
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    bool branches = all(lessThan(pixel, FC.size)) && shoot(pixel);
+    if (FC.branches_off != 0) list_pixel(pixel, branches);
 }

@@ -31,10 +31,11 @@ void main() {
     if (FC.view == 10) {
         radiance = ambient_at(imageLoad(gbuffer_position, p).xyz, unpack_normal(imageLoad(gbuffer_surface, p).x));
     }
+    if (FC.view == 23) radiance = imageLoad(image_secondary, p).rgb;
     vec4 moments = FC.denoised != 0 ? imageLoad(moments_now, p) : vec4(0.0);
     vec4 filtered = FC.denoised == 0 ? vec4(imageLoad(image_direct, p).rgb, 0.0)
                                      : unpack_colour(FC.denoised == 2 ? imageLoad(filter_b, p) : imageLoad(filter_a, p));
-    if (FC.view == 11 || FC.view >= 18) radiance = filtered.rgb;
+    if (FC.view == 11 || (FC.view >= 18 && FC.view < 23)) radiance = filtered.rgb;
     if (FC.view == 14) radiance = vec3(sqrt(filtered.a));
     if (FC.view == 15) radiance = vec3(moments.x, sqrt(moments.y), 0.0);
     if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);

@@ -119,7 +119,9 @@ fn records() -> Vec<Record> {
             sky_scale,
             cloud_height,
             first_deform,
-            deform_count
+            deform_count,
+            ior,
+            lobe
         }),
         record!(Wave {
             function,
@@ -308,6 +310,8 @@ fn records() -> Vec<Record> {
             reservoir_history,
             strata,
             counters,
+            secondary_pixels,
+            triangle_lights,
             exposure,
             focus,
             srgb,
@@ -375,7 +379,11 @@ fn records() -> Vec<Record> {
             dynamic_triangles_count,
             fog_count,
             portal_count,
-            max_depth
+            max_depth,
+            secondary,
+            glossy,
+            branches_off,
+            padding_
         }),
         record!(Push {
             frame,

@@ -12,11 +12,34 @@ uvec2 random_bits(uint address, uint dimension) {
     return bits2(FC.sequence, random_key(FC.seed, address, dimension), drawn_index);
 }
 
-LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at) {
+LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at, uint points) {
     uvec2 bits = random_bits(address, dimension);
     vec2 u = vec2(unit_float(bits.x), unit_float(bits.y));
-    return sample_light(FC.lights.at[light], at, u, point_sampling());
+    return sample_light(FC.lights.at[light], at, u, points);
 }
+
+#ifdef LIGHTS_LOBES
+// Lobe of the receiver, which takes one more light sample; none where its width is 0.
+Lobe light_lobe;
+// The receiver's lobe alone is wanted.
+bool lobe_alone;
+// Radiance over Fresnel's factor that the lobe reflects, as far as light samples find it.
+vec3 lobe_light;
+
+// What a light sample of the lobe counts: see src/reference/direct.rs.
+float lobe_weight(SurfaceHit at, Choice choice, LightSample s) {
+    Light light = FC.lights.at[choice.light];
+    vec3 to = s.sky ? s.target : s.target - at.position;
+    vec3 direction = normalize(to);
+    float weight = PI * lobe_brdf(light_lobe, direction) / choice.probability;
+    if (light.kind == LIGHT_TRIANGLE) {
+        float cosine = abs(dot(normalize(cross(light.p1, light.p2)), direction));
+        float own = choice.probability * dot(to, to) / max(cosine * light.size, 1.17549435e-38);
+        weight *= FC.soft_shadows != 0 ? own / (own + lobe_pdf(light_lobe, direction)) : 0.0;
+    }
+    return weight > 0.0 ? weight : 0.0;
+}
+#endif
 
 vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
     if (max(s.value.x, max(s.value.y, s.value.z)) <= 0.0) {
@@ -41,14 +64,32 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     uint r = 0;
     uint in_run = 0;
     vec3 sum = vec3(0.0);
-    [[dont_unroll]] for (uint i = 0; i < count; i++) {
+    uint diffuse_count = count;
+    uint first = 0;
+#ifdef LIGHTS_LOBES
+    lobe_light = vec3(0.0);
+    if (light_lobe.alpha > 0.0) count++;
+    if (lobe_alone) first = diffuse_count;
+#endif
+    [[dont_unroll]] for (uint i = first; i < count; i++) {
+        bool for_lobe = i == diffuse_count;
+        Choice picked = NO_CHOICE;
         LightSample kept = LightSample(vec3(0.0), vec3(0.0), false);
         float kept_target = 0.0;
         float weights = 0.0;
-        [[dont_unroll]] for (uint c = 0; c < n; c++) {
+        [[dont_unroll]] for (uint c = 0; c < (for_lobe ? 1 : n); c++) {
             Choice choice;
             uint dimension;
             float keep = 0.0;
+            uint points = point_sampling();
+#ifdef LIGHTS_LOBES
+            if (for_lobe) {
+                if (row.weight == 0) continue;
+                choice = choose_power(row, random_bits(address, DIM_LOBE_PICK).x);
+                dimension = DIM_LOBE_POINT;
+                if (points == POINTS_SOLID_ANGLE) points = POINTS_AREA;
+            } else
+#endif
             if (every) {
                 LightRun run = FC.light_runs.at[row.first_run + r];
                 choice.light = run.first_light + in_run;
@@ -67,16 +108,25 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
                 dimension = resampled ? DIM_CANDIDATE_POINT + i * MAX_CANDIDATES + c : DIM_LIGHT_POINT + i;
                 keep = unit_float(bits.y);
             }
-            LightSample s = sampled(choice.light, dimension, address, at);
+            picked = choice;
+            LightSample s = sampled(choice.light, dimension, address, at, points);
             float target = luminance(s.value);
             if (!(target > 0.0)) continue;
             float weight = target / choice.probability;
             weights += weight;
-            if (!resampled || keep * weights < weight) {
+            if (for_lobe || !resampled || keep * weights < weight) {
                 kept = s;
                 kept_target = target;
             }
         }
+#ifdef LIGHTS_LOBES
+        if (for_lobe) {
+            float weight = kept_target > 0.0 ? lobe_weight(at, picked, kept) : 0.0;
+            if (kept_target > 0.0 && weight == 0.0) continue;
+            lobe_light = traced(kept, at, counts) * weight;
+            continue;
+        }
+#endif
         vec3 value = traced(kept, at, counts);
         if (kept_target > 0.0) sum += value * (weights / (kept_target * float(n)) * share);
     }

@@ -11,6 +11,7 @@
 // | emission | radiance emitted towards the eye |
 // | share | share of the surface's light that comes through the layers before it |
 // | layers | radiance of those layers |
+// | secondary | radiance of all that branches off: reflections, but for those that the pixel shows alone |
 // | direct | irradiance/π by direct light, not multiplied with the albedo |
 // | composite | radiance of the pixel |
 // | mean, compensation | accumulated radiance: see accumulate.comp |
@@ -46,14 +47,15 @@ layout(set = 1, binding = 17, rgba32f) uniform image2D gradient_b;
 layout(set = 1, binding = 18, rgba32f) uniform image2D image_share;
 layout(set = 1, binding = 19, rgba32f) uniform image2D image_layers;
 layout(set = 1, binding = 20, rgba32f) uniform image2D image_mean_layers;
-layout(set = 1, binding = 21, rgba16ui) uniform uimage2D guide;
-layout(set = 1, binding = 22, rgba16ui) uniform uimage2D old_guide;
-layout(set = 1, binding = 23, rgba16ui) uniform uimage2D irradiance_now;
-layout(set = 1, binding = 24, rgba16ui) uniform uimage2D irradiance_before;
-layout(set = 1, binding = 25, rgba32f) uniform image2D moments_now;
-layout(set = 1, binding = 26, rgba32f) uniform image2D moments_before;
-layout(set = 1, binding = 27, rgba32f) uniform image2D taa_now;
-layout(set = 1, binding = 28, rgba32f) uniform image2D taa_before;
+layout(set = 1, binding = 21, rgba32f) uniform image2D image_secondary;
+layout(set = 1, binding = 22, rgba16ui) uniform uimage2D guide;
+layout(set = 1, binding = 23, rgba16ui) uniform uimage2D old_guide;
+layout(set = 1, binding = 24, rgba16ui) uniform uimage2D irradiance_now;
+layout(set = 1, binding = 25, rgba16ui) uniform uimage2D irradiance_before;
+layout(set = 1, binding = 26, rgba32f) uniform image2D moments_now;
+layout(set = 1, binding = 27, rgba32f) uniform image2D moments_before;
+layout(set = 1, binding = 28, rgba32f) uniform image2D taa_now;
+layout(set = 1, binding = 29, rgba32f) uniform image2D taa_before;
 
 // Octahedral map of a unit vector to 2 x 16 bits (Meyer et al. 2010).
 uint pack_normal(vec3 n) {

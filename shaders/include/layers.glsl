@@ -6,10 +6,11 @@
 #include "through.glsl"
 #include "fog.glsl"
 #include "portal.glsl"
+#include "branches.glsl"
 
 const float LEAST_SHARE = 1e-5;
 
-// What a camera ray comes to.
+// What a path comes to.
 struct Seen {
     SurfaceHit surface;
     // Its triangle is NONE where nothing is shaded.
@@ -20,32 +21,49 @@ struct Seen {
     vec3 emission;
     // Radiance of the layers.
     vec3 layers;
-    // Where the surface is seen: through mirrors and portals that is not where it is.
+    // Direction in which it is met.
+    vec3 direction;
+    // Its lobe is to be lit, too.
+    bool glossy;
+    // Where the surface is seen: through mirrors, portals and water that is not where it is.
     Map place;
     // Length of the way to it, units.
     float distance;
 };
 
-Seen see(vec3 origin, vec3 direction, uint address) {
+float chance_on(uint address, uint dimension) {
+    return unit_float(bits2(FC.sequence, random_key(FC.seed, address, dimension), sample_index).x);
+}
+
+Seen see(Path path) {
+    vec3 origin = path.origin;
+    vec3 direction = path.direction;
     Seen out_;
     out_.hit.triangle = NONE;
     out_.hit.t = 0.0;
-    out_.share = vec3(1.0);
+    out_.share = path.share;
     out_.emission = vec3(0.0);
     out_.layers = vec3(0.0);
+    out_.direction = direction;
+    out_.glossy = false;
     out_.place = identity_map();
     out_.distance = 0.0;
-    float travelled = 0.0;
-    uint depth = 0;
+    float travelled = path.travelled;
+    uint depth = path.depth;
+    float pdf = path.pdf;
     bool pending = false;
     SurfaceHit lit;
     Hit lit_hit;
     vec3 lit_share = vec3(0.0);
+    vec3 lit_direction = direction;
     float lit_fog = 1.0;
+    float lit_distance = 0.0;
     // Fog on the way to the last surface, and what it leaves.
     vec4 fog = vec4(0.0, 0.0, 0.0, 1.0);
+    const vec4 NO_FOG = vec4(0.0, 0.0, 0.0, 1.0);
     begin_walk();
     uint dimension = DIM_LAYER;
+    uint branch = 0;
     [[dont_unroll]] for (uint i = 0; i < MOST_LAYERS; i++) {
         meets_layers = true;
         Hit hit = trace(origin, direction, RAY_FAR, false);
@@ -55,6 +73,7 @@ Seen see(vec3 origin, vec3 direction, uint address) {
                 out_.surface = lit;
                 out_.hit = lit_hit;
                 out_.share = lit_share * lit_fog;
+                out_.direction = lit_direction;
             }
             return out_;
         }
@@ -63,62 +82,125 @@ Seen see(vec3 origin, vec3 direction, uint address) {
         out_.distance = travelled + hit.t;
         SurfaceHit s = surface_at(hit, direction, FC.cone * (1.0 + travelled / hit.t));
         if (!drawn(material, s.front)) continue;
-        vec3 emission = emission_seen(s, direction);
         bool layer = (material.flags & MATERIAL_LAYER) != 0;
+        bool follows = FC.secondary != SECONDARY_OFF && depth < FC.max_depth;
+        uint reflection = REFLECTS_NOT;
+        if (follows) reflection = split(material, s, direction, out_.share);
+        else unsplit(s);
+        vec3 emission = emission_met(pdf, path.row, s, hit, direction);
         vec4 there = fog_at(origin, direction, hit.t);
         out_.layers += out_.share * (there.rgb - fog.rgb);
         fog = there;
         if (pending) {
-            if (!layer && hit.t - lit_hit.t <= ON_RECEIVER) {
+            if (!layer && out_.distance - lit_distance <= ON_RECEIVER) {
                 out_.emission = lit.through * emission;
                 s.albedo = lit.albedo + lit.through * s.albedo;
                 out_.surface = s;
                 out_.hit = hit;
                 out_.share = lit_share * fog.a;
+                out_.direction = direction;
                 return out_;
             }
             float own = luminance(lit_share * lit.albedo);
             float rest = luminance(out_.share);
-            float chance = own / max(own + rest, 1.17549435e-38);
-            uint bits = bits2(FC.sequence, random_key(FC.seed, address, dimension), sample_index).x;
+            float likely = own / max(own + rest, 1.17549435e-38);
+            float u = chance_on(path.address, dimension);
             dimension++;
             if (FC.choose_layers != 0) {
-                if (unit_float(bits) < chance) {
+                if (u < likely) {
                     out_.surface = lit;
                     out_.hit = lit_hit;
-                    out_.share = lit_share * lit_fog / chance;
+                    out_.share = lit_share * lit_fog / likely;
+                    out_.direction = lit_direction;
                     return out_;
                 }
-                out_.share /= 1.0 - chance;
+                out_.share /= 1.0 - likely;
             }
             pending = false;
         }
-        if (!layer) {
+        vec3 share = out_.share * fog.a;
+        if (reflection == REFLECTS_GLOSSY) {
+            out_.glossy = !layer;
+            branch_count++;
+#ifdef FOLLOWS_BRANCHES
+            Path from = path;
+            from.depth = depth;
+            push_lobe(from, material, s, direction, branch, share, out_.distance, !layer);
+#endif
+            branch++;
+        }
+        bool goes_back = false;
+        if (reflection == REFLECTS_SMOOTH) {
+            goes_back = luminance(s.albedo + s.glow + s.through) <= 0.0;
+            if (!goes_back) {
+                if (FC.secondary == SECONDARY_BOTH && branch_count < MOST_BRANCHES) {
+                    branch_count++;
+#ifdef FOLLOWS_BRANCHES
+                    vec3 start, back;
+                    mirrored(s, direction, start, back);
+                    push_branch(Path(start, back, share * s.specular, out_.distance, depth + 1,
+                                     branch_address(path.address, branch), -1.0, 0));
+#endif
+                    branch++;
+                } else {
+                    float likely = clamp(s.specular.x, LEAST_BRANCH, 1.0 - LEAST_BRANCH);
+                    goes_back = chance_on(path.address, dimension) < likely;
+                    dimension++;
+                    out_.share /= goes_back ? likely : 1.0 - likely;
+                }
+            }
+            depth++;
+        }
+        if (!layer && !goes_back) {
             out_.surface = s;
             out_.hit = hit;
             out_.emission = emission;
             out_.share *= fog.a;
+            out_.direction = direction;
             return out_;
         }
-        out_.layers += out_.share * emission * fog.a;
-        if ((material.flags & MATERIAL_PORTAL) != 0) {
-            out_.share *= s.through * fog.a;
-            depth++;
-            if (depth > FC.max_depth) return out_;
-            go_through(FC.triangles.at[hit.triangle].surface, s, origin, direction, out_.place);
-            travelled += hit.t;
+        vec3 onward = vec3(0.0);
+        if (goes_back) {
+            out_.share *= s.specular * fog.a;
+            // As far as motion goes, the surface reflects like a plane.
+            reflect_at(s.position, s.shading_normal, out_.place);
+            mirrored(s, direction, origin, onward);
+        } else {
+            out_.layers += out_.share * emission * fog.a;
+            if ((material.flags & MATERIAL_PORTAL) != 0) {
+                out_.share *= s.through * fog.a;
+                depth++;
+                if (depth > FC.max_depth) return out_;
+                onward = direction;
+                go_through(FC.triangles.at[hit.triangle].surface, s, origin, onward, out_.place);
+            } else {
+                if (s.albedo != vec3(0.0)) {
+                    pending = true;
+                    lit = s;
+                    lit_hit = hit;
+                    lit_direction = direction;
+                    lit_share = out_.share;
+                    lit_fog = fog.a;
+                    lit_distance = out_.distance;
+                }
+                out_.share *= s.through;
+                if (follows) onward = bent(material, s, direction);
+                if (onward != vec3(0.0)) {
+                    out_.share *= fog.a;
+                    lit_share *= lit_fog;
+                    lit_fog = 1.0;
+                    bends_at(s.position, direction, onward, out_.place);
+                    origin = offset_point(s.position, -s.geometric_normal);
+                }
+            }
+        }
+        if (onward != vec3(0.0)) {
+            direction = onward;
+            travelled = out_.distance;
+            pdf = -1.0;
+            fog = NO_FOG;
             begin_walk();
-            fog = vec4(0.0, 0.0, 0.0, 1.0);
-            continue;
         }
-        if (s.albedo != vec3(0.0)) {
-            pending = true;
-            lit = s;
-            lit_hit = hit;
-            lit_share = out_.share;
-            lit_fog = fog.a;
-        }
-        out_.share *= s.through;
     }
     return out_;
 }

@@ -14,6 +14,8 @@ const float CLOUD_WORLD = 4096.0;
 const float NOISE_STEPS = 256.0;
 const float TAU = 6.28318530717958647692;
 const float LEAST = 1.17549435e-38;
+// Level of detail of an image's last level, its mean.
+const float MEAN_LOD = 64.0;
 
 // What stages look at.
 struct Point {
@@ -34,6 +36,7 @@ struct Shade {
     vec3 albedo;
     vec3 glow;
     vec3 through;
+    vec3 specular;
 };
 
 // Fraction of a period, 0..1.
@@ -120,14 +123,15 @@ vec3 rgb_factor(Stage s, Point p) {
     return s.rgb;
 }
 
-vec4 stage_texel(Stage s, Point p, bool encoded) {
+// `mean`: its image's mean stands for the image.
+vec4 stage_texel(Stage s, Point p, bool encoded, bool mean) {
     if ((s.flags & STAGE_WHITE) != 0) return vec4(1.0);
     uint turn = min(uint(clock_fraction(s.frame_rate) * float(s.frames)), s.frames - 1u);
     uint index = s.textures[turn];
     float density;
     vec2 uv = stage_coordinates(s, p, density);
     TextureInfo info = FC.textures.at[index];
-    float lod = p.lod + 0.5 * log2(float(info.width * info.height)) + log2(max(density, LEAST));
+    float lod = mean ? MEAN_LOD : p.lod + 0.5 * log2(float(info.width * info.height)) + log2(max(density, LEAST));
     bool clamped = (s.flags & STAGE_CLAMP) != 0;
     return sample_as(index, uv, lod, clamped, encoded);
 }
@@ -140,12 +144,14 @@ vec3 laid(vec3 c, float opacity) {
     return opacity > 0.0 ? decode_srgb(min(c / opacity, vec3(1.0))) * opacity : decode_srgb(c);
 }
 
-Shade shade(Material material, Point p) {
-    vec3 lit = vec3(0.0), over = vec3(0.0), add = vec3(0.0), through = vec3(1.0);
+// `glossy`: glossy stages reflect.
+Shade shade(Material material, Point p, bool glossy) {
+    vec3 lit = vec3(0.0), over = vec3(0.0), add = vec3(0.0), through = vec3(1.0), specular = vec3(0.0);
     float share = 1.0;
     [[dont_unroll]] for (uint i = 0; i < material.stage_count; i++) {
         Stage s = FC.stages.at[material.first_stage + i];
-        vec4 c = stage_texel(s, p, true) * vec4(rgb_factor(s, p), alpha_factor(s, p));
+        bool reflects = glossy && (s.flags & STAGE_GLOSSY) != 0;
+        vec4 c = stage_texel(s, p, true, reflects) * vec4(rgb_factor(s, p), alpha_factor(s, p));
         bool is_lit = (s.flags & STAGE_LIT) != 0;
         float own = 1.0;
         vec3 from_there = vec3(0.0);
@@ -161,6 +167,17 @@ Shade shade(Material material, Point p) {
         if (s.destination == BLEND_SRC_COLOR) from_there += c.rgb;
         else if (s.destination == BLEND_ONE_MINUS_SRC_COLOR) from_there -= c.rgb;
         bool coloured = from_there != vec3(0.0) || s.source == BLEND_DST_COLOR || s.destination == BLEND_SRC_COLOR;
+        vec3 e = c.rgb * own;
+        if (reflects) {
+            vec3 base = lit + over + add;
+            specular = clamp(specular * keep + e + base * max(from_there, 0.0), 0.0, 1.0);
+            lit *= keep;
+            over *= keep;
+            add *= keep;
+            if (coloured) through *= max(keep + from_there, 0.0);
+            else share *= keep;
+            continue;
+        }
         if (is_lit && coloured) {
             lit += over + add;
             over = vec3(0.0);
@@ -170,9 +187,9 @@ Shade shade(Material material, Point p) {
         lit *= k;
         over *= k;
         add *= k;
+        specular *= clamp(k, 0.0, 1.0);
         if (coloured) through *= k;
         else share *= keep;
-        vec3 e = c.rgb * own;
         if (is_lit) {
             lit += e;
         } else if ((s.flags & STAGE_EMISSION) == 0) {
@@ -191,6 +208,7 @@ Shade shade(Material material, Point p) {
     r.albedo = laid(lit, opacity);
     r.glow = UNLIT * (opacity == 1.0 ? decode_srgb(min(over + add, vec3(1.0))) : laid(over, opacity) + decode_srgb(add));
     r.through = decode_srgb(through) * share;
+    r.specular = decode_srgb(specular);
     return r;
 }
 
@@ -200,7 +218,7 @@ vec3 shining(Material material, Point p) {
     [[dont_unroll]] for (uint i = 0; i < material.stage_count; i++) {
         Stage s = FC.stages.at[material.first_stage + i];
         if ((s.flags & STAGE_EMISSION) == 0) continue;
-        vec4 c = stage_texel(s, p, false);
+        vec4 c = stage_texel(s, p, false, false);
         float alpha = s.source == BLEND_SRC_ALPHA ? c.a * alpha_factor(s, p) : 1.0;
         sum += c.rgb * decode_srgb(rgb_factor(s, p)) * alpha;
     }
@@ -213,7 +231,7 @@ float tested_alpha(Material material, Point p) {
         return sample_texture(material.texture_index, p.uv, 0.0, (material.flags & MATERIAL_CLAMP) != 0).a;
     }
     Stage s = FC.stages.at[material.alpha_stage];
-    return stage_texel(s, p, false).a * alpha_factor(s, p);
+    return stage_texel(s, p, false, false).a * alpha_factor(s, p);
 }
 
 // Where clouds are seen in a direction: their texture coordinates.

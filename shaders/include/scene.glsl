@@ -31,6 +31,9 @@ const uint MATERIAL_BACK = 256;
 const uint MATERIAL_NO_FRONT = 512;
 const uint MATERIAL_MOVING_EMISSION = 1024;
 const uint MATERIAL_PORTAL = 2048;
+const uint MATERIAL_DIELECTRIC = 4096;
+const uint MATERIAL_PANE = 8192;
+const uint MATERIAL_GLOSSY = 16384;
 
 struct Material {
     uint texture_index;
@@ -48,6 +51,8 @@ struct Material {
     float cloud_height;
     uint first_deform;
     uint deform_count;
+    float ior;
+    float lobe;
 };
 
 const uint WAVE_SINE = 0;
@@ -124,6 +129,7 @@ const uint STAGE_LIT = 1;
 const uint STAGE_CLAMP = 2;
 const uint STAGE_EMISSION = 4;
 const uint STAGE_WHITE = 8;
+const uint STAGE_GLOSSY = 16;
 const uint SOURCE_WAVE = 1;
 const uint SOURCE_VERTEX = 2;
 const uint SOURCE_ONE_MINUS_VERTEX = 3;
@@ -329,6 +335,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Wo
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Floats4 { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Reservoirs { Reservoir at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Strata { Stratum at[]; };
+// Pixels of which something branches off: arguments of the dispatch over them, their number, and x + y·65536 of each.
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SecondaryPixels { uint groups[3]; uint count; uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Floats { float at[]; };
 
@@ -368,6 +376,8 @@ struct FrameConstants {
     Reservoirs reservoir_history;
     Strata strata;
     Counters counters;
+    SecondaryPixels secondary_pixels;
+    LightWeights triangle_lights;
     Floats exposure;
     Floats focus;
     Floats srgb;
@@ -436,6 +446,10 @@ struct FrameConstants {
     uint fog_count;
     uint portal_count;
     uint max_depth;
+    uint secondary;
+    uint glossy;
+    uint branches_off;
+    uint padding_;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

@@ -12,6 +12,8 @@ struct SurfaceHit {
     vec3 glow;
     // Share of what is behind that shows through.
     vec3 through;
+    // Share of what it reflects as a mirror or in its lobe; until layers.glsl has looked at it, at normal incidence.
+    vec3 specular;
     uint material;
     uint triangle;
     bool front;
@@ -162,6 +164,7 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
     s.albedo = vec3(0.0);
     s.glow = vec3(0.0);
     s.through = vec3(0.0);
+    s.specular = vec3(0.0);
     s.cluster = NONE;
     s.row = t.fallback_row;
     Material material = FC.materials.at[t.material];
@@ -180,7 +183,7 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
         p.distance = hit.t * d;
         p.lod = cone > 0.0 ? texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(1.0), width, cosine) : -1e30;
         if (sky) p = cloud_point(material, direction / d);
-        Shade shaded = shade(material, p);
+        Shade shaded = shade(material, p, FC.glossy != 0 && !sky);
         if (sky) {
             s.glow = sky_seen(material, direction, shaded);
             return s;
@@ -188,10 +191,11 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
         s.albedo = shaded.albedo;
         s.glow = shaded.glow;
         s.through = shaded.through;
+        s.specular = shaded.specular;
         return s;
     }
     if (sky) {
-        s.glow = sky_seen(material, direction, Shade(vec3(0.0), vec3(0.0), vec3(1.0)));
+        s.glow = sky_seen(material, direction, Shade(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0)));
         return s;
     }
     float lod = 0.0;
@@ -233,14 +237,19 @@ vec3 emitted(Material material, vec2 uv, vec3 position, vec3 direction) {
     return material.emission * emission_picture(material, uv, position, direction);
 }
 
-// Radiance that a ray receives from a surface it hits, but for the light that the surface reflects.
-vec3 emission_seen(SurfaceHit s, vec3 direction) {
+// Radiance that a ray receives from a surface it hits, but for the light that the surface reflects; `shown` is as
+// `FC.shown_emission`.
+vec3 emission_shown(SurfaceHit s, vec3 direction, uint shown) {
     Material material = FC.materials.at[s.material];
     if ((material.flags & MATERIAL_SKY) != 0) return s.glow;
-    vec3 factor = FC.shown_emission == 0 ? material.shown : material.emission;
+    vec3 factor = shown == 0 ? material.shown : material.emission;
     bool emits = s.front || (material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER)) != 0;
     if (!emits || factor == vec3(0.0)) return s.glow;
     return s.glow + factor * emission_picture(material, s.uv, s.position, direction);
+}
+
+vec3 emission_seen(SurfaceHit s, vec3 direction) {
+    return emission_shown(s, direction, FC.shown_emission);
 }
 
 #endif

@@ -5,6 +5,7 @@ use super::common::Common;
 use super::light_list::LightList;
 use crate::console::Cvars;
 use crate::output::stdout;
+use crate::reference::views::feature_views;
 use crate::scene::report::Report;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
@@ -20,6 +21,9 @@ pub struct Args {
     /// List the lights, their sources, and what part of the light in the lightmaps they explain
     #[arg(long)]
     lights: bool,
+    /// Print, as JSON, a view of each feature of the shader language that the map's materials use
+    #[arg(long)]
+    views: bool,
 }
 
 fn list<K: Display, V: Display>(f: &mut fmt::Formatter, title: &str, entries: &BTreeMap<K, V>) -> fmt::Result {
@@ -40,6 +44,10 @@ pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
         .map_err(CliError::failed);
     }
     let scene = common.scene(&args.map)?;
+    if args.views {
+        let views = feature_views(&scene);
+        return stdout::line(serde_json::to_string_pretty(&views).map_err(CliError::failed)?).map_err(CliError::failed);
+    }
     let r = Report::new(&scene);
     if args.json {
         stdout::line(serde_json::to_string_pretty(&r).map_err(CliError::failed)?)

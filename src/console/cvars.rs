@@ -47,7 +47,7 @@ const fn choice(name: &'static str, words: &'static [&'static str], help: &'stat
 }
 
 /// Views of the frame's intermediate images, by `rt_view`; the shader's numbering is the order here.
-pub const VIEWS: [&str; 23] = [
+pub const VIEWS: [&str; 24] = [
     "final",
     "albedo",
     "normal",
@@ -71,6 +71,7 @@ pub const VIEWS: [&str; 23] = [
     "atrous2",
     "atrous3",
     "atrous4",
+    "secondary",
 ];
 
 /// Every console variable.
@@ -113,7 +114,19 @@ pub const CVARS: &[Cvar] = &[
         5,
         1,
         16,
-        "mirrors and portals that a ray goes through at most",
+        "mirrors, portals, glass and water that a ray is followed through at most",
+    ),
+    choice(
+        "rt_secondary",
+        &["both", "one", "off"],
+        "where glass or water both reflects and lets through: follows both, one at random, or neither and shows the stages alone",
+    ),
+    int(
+        "rt_glossy",
+        1,
+        0,
+        1,
+        "environment-mapped stages reflect what is around; 0 shows the picture that the game puts there",
     ),
     int("rt_antialiasing", 1, 0, 1, "jitters the ray within the pixel"),
     int("rt_dof", 0, 0, 1, "depth of field through a thin lens"),

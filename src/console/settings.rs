@@ -2,7 +2,7 @@
 
 use super::Cvars;
 use crate::lighting::Lights;
-use crate::render::settings::{AmbientLight, LightSampling, Settings, ShownEmission, Tonemap};
+use crate::render::settings::{AmbientLight, LightSampling, Secondary, Settings, ShownEmission, Tonemap};
 use crate::scene::clock::Clock;
 use crate::scene::sampling::Sequence;
 
@@ -75,6 +75,12 @@ pub fn settings(cvars: &Cvars) -> Settings {
             ShownEmission::Game
         },
         max_depth: number("rt_maxDepth") as u32,
+        secondary: match number("rt_secondary") as u32 {
+            0 => Secondary::Both,
+            1 => Secondary::One,
+            _ => Secondary::Off,
+        },
+        glossy: on("rt_glossy"),
         choose_layers: true,
         clock: Clock::default(),
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::error::Context;
-use super::{Commands, DescriptorLayout, Device, GpuError, PipelineCache};
+use super::{Buffer, Commands, DescriptorLayout, Device, GpuError, PipelineCache};
 
 /// What a compute pipeline is made from.
 #[derive(Clone, Copy)]
@@ -149,6 +149,13 @@ impl ComputePipeline {
                 .cmd_dispatch(cmd.raw(), groups[0], groups[1], groups[2])
         };
         Ok(())
+    }
+
+    /// Runs as many work groups as the first three words of a buffer say.
+    pub fn dispatch_indirect(&self, cmd: &Commands<'_>, groups: &Buffer) {
+        // SAFETY: all our buffers have indirect usage and this one holds the three words; binding the right things is the
+        // caller's.
+        unsafe { self.device.raw().cmd_dispatch_indirect(cmd.raw(), groups.raw(), 0) };
     }
 
     /// Vulkan's handle.

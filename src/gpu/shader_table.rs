@@ -40,6 +40,8 @@ shader_table! {
     "primary_rayquery": "primary.comp" ["TRACE_RAYQUERY" = "1"];
     "direct_bvh": "direct.comp" [];
     "direct_rayquery": "direct.comp" ["TRACE_RAYQUERY" = "1"];
+    "secondary_bvh": "secondary.comp" [];
+    "secondary_rayquery": "secondary.comp" ["TRACE_RAYQUERY" = "1"];
     "resample_bvh": "resample.comp" [];
     "resample_rayquery": "resample.comp" ["TRACE_RAYQUERY" = "1"];
     "reuse_bvh": "reuse.comp" [];

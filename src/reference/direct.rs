@@ -1,7 +1,7 @@
 //! Direct light by next-event estimation. Counterpart of `shaders/direct.comp`.
 
-use super::light_choice::Chances;
-use super::light_sample::{LightSample, PointSampling, sample_light};
+use super::light_choice::{Chances, choose_by_power};
+use super::light_sample::{LightSample, PointSampling, Target, sample_light};
 use super::surface::{SurfaceHit, offset_point};
 use super::trace::Tracer;
 use super::visibility::visible;
@@ -9,11 +9,14 @@ use crate::render::settings::{LightSampling, Settings};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
 use crate::scene::light_power::luminance;
+use crate::scene::optics::Lobe;
+use crate::scene::records::LIGHT_TRIANGLE;
 use crate::scene::sampling::{
-    DIM_CANDIDATE_PICK, DIM_CANDIDATE_POINT, DIM_EVERY_LIGHT, DIM_LIGHT_PICK, DIM_LIGHT_POINT, MAX_CANDIDATES, bits2,
-    key, unit,
+    DIM_CANDIDATE_PICK, DIM_CANDIDATE_POINT, DIM_EVERY_LIGHT, DIM_LIGHT_PICK, DIM_LIGHT_POINT, DIM_LOBE_PICK,
+    DIM_LOBE_POINT, MAX_CANDIDATES, bits2, key, unit,
 };
 use glam::Vec3;
+use std::f32::consts::PI;
 
 /// Rays traced and avoided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -109,6 +112,55 @@ pub fn taken_sample(
 ) -> Option<Taken> {
     let estimator = Estimator::new(scene, tracer, settings, at, address);
     estimator.taken(&estimator.chances(), i, steps)
+}
+
+/// Radiance over Fresnel's factor that a surface's lobe reflects of one light, chosen by power and sampled by area; lights
+/// that the lobe's own directions find, too, are weighted by the balance heuristic.
+pub fn lobe_light(
+    scene: &Scene,
+    tracer: &Tracer,
+    settings: &Settings,
+    at: &SurfaceHit,
+    lobe: &Lobe,
+    address: SampleAddress,
+    counts: &mut RayCounts,
+) -> Vec3 {
+    let mut estimator = Estimator::new(scene, tracer, settings, at, address);
+    estimator.points = if settings.soft_shadows {
+        PointSampling::Area
+    } else {
+        PointSampling::Centre
+    };
+    let (lists, row) = light_row(scene, settings, at.row);
+    let Some(choice) = choose_by_power(&scene.lights, lists, row, estimator.bits(DIM_LOBE_PICK)[0]) else {
+        return Vec3::ZERO;
+    };
+    let Some(sample) = estimator.sample(choice.light, DIM_LOBE_POINT) else {
+        counts.shadow_skipped += 1;
+        return Vec3::ZERO;
+    };
+    let light = &scene.lights.lights[choice.light as usize];
+    let direction = match sample.target {
+        Target::Sky(d) => d,
+        Target::Point(p) => (p - at.position).normalize_or_zero(),
+    };
+    let mut weight = PI * lobe.brdf(direction) / choice.probability;
+    if light.kind == LIGHT_TRIANGLE {
+        let Target::Point(point) = sample.target else {
+            return Vec3::ZERO;
+        };
+        let normal = Vec3::from(light.p1).cross(light.p2.into()).normalize_or_zero();
+        let cosine = normal.dot(direction).abs();
+        let own =
+            choice.probability * (point - at.position).length_squared() / (cosine * light.size).max(f32::MIN_POSITIVE);
+        // With hard shadows a lamp is a point to light samples, and the lobe's directions find all of it.
+        let share = own / (own + lobe.pdf(direction));
+        weight *= if settings.soft_shadows { share } else { 0.0 };
+    }
+    if !(weight > 0.0) {
+        return Vec3::ZERO;
+    }
+    estimator.traced(Some(sample), weight, counts)
 }
 
 struct Estimator<'a> {

@@ -114,6 +114,27 @@ fn choose_power(sums: &[u32], row: LightRow, runs: &[LightRun], bits: u32) -> Ch
     }
 }
 
+/// Chooses from a row in proportion to power, whatever the way of choosing is elsewhere.
+pub fn choose_by_power(lights: &LightTable, lists: &LightLists, row: u32, bits: u32) -> Option<Choice> {
+    let record = lists.rows[row as usize];
+    let runs = &lists.runs[record.first_run as usize..(record.first_run + record.run_count) as usize];
+    (record.weight > 0).then(|| choose_power(&lights.weights, record, runs, bits))
+}
+
+/// Probability that [`choose_by_power`] chooses a light: 0 for lights outside the row.
+pub fn power_chance(lights: &LightTable, lists: &LightLists, row: u32, light: u32) -> f32 {
+    let record = lists.rows[row as usize];
+    let runs = &lists.runs[record.first_run as usize..(record.first_run + record.run_count) as usize];
+    let at = runs.partition_point(|r| r.first_light <= light);
+    let listed = at
+        .checked_sub(1)
+        .is_some_and(|i| light < runs[i].first_light + runs[i].count);
+    if !listed || record.weight == 0 {
+        return 0.0;
+    }
+    (lights.weights[light as usize + 1] - lights.weights[light as usize]) as f32 / record.weight as f32
+}
+
 /// Estimated irradiance/π that the node's lights give per strength: cosines at both ends at their best, over a squared
 /// distance between those to the middle and to the box. 0 only where the node cannot light the receiver.
 pub fn importance(node: &LightNode, at: &SurfaceHit) -> f32 {

@@ -3,6 +3,7 @@
 //! It follows the same estimators with the same random numbers as `shaders/`, file by file; intersections and sums are
 //! done in double precision.
 
+pub mod branches;
 pub mod direct;
 pub mod layers;
 pub mod light_cells;
@@ -15,6 +16,7 @@ pub mod renderer;
 pub mod surface;
 pub mod texture;
 pub mod trace;
+pub mod views;
 pub mod visibility;
 
 pub use renderer::CpuRenderer;

@@ -14,6 +14,8 @@ use std::f32::consts::TAU;
 const SPECULAR_LIGHT: Vec3 = Vec3::new(-960.0, 1980.0, 96.0);
 /// Waves of turbulence per unit of space.
 const TURBULENCE: f32 = 1.0 / 1024.0;
+/// Level of detail of an image's last level, its mean.
+const MEAN_LOD: f32 = 64.0;
 /// Radius of the world that clouds lie around, units.
 const CLOUD_WORLD: f32 = 4096.0;
 
@@ -137,14 +139,18 @@ fn rgb_factor(s: &Stage, p: &Point, clock: Clock) -> Vec3 {
     }
 }
 
-fn texel(scene: &Scene, s: &Stage, p: &Point, clock: Clock, encoded: bool) -> Vec4 {
+fn texel(scene: &Scene, s: &Stage, p: &Point, clock: Clock, encoded: bool, mean: bool) -> Vec4 {
     if s.flags & STAGE_WHITE != 0 {
         return Vec4::ONE;
     }
     let texture = &scene.textures[texture_of(s, clock) as usize];
     let (uv, density) = coordinates(scene, s, p, clock);
     let size = (texture.width * texture.height) as f32;
-    let lod = p.lod + 0.5 * size.log2() + density.max(f32::MIN_POSITIVE).log2();
+    let lod = if mean {
+        MEAN_LOD
+    } else {
+        p.lod + 0.5 * size.log2() + density.max(f32::MIN_POSITIVE).log2()
+    };
     let clamp = s.flags & STAGE_CLAMP != 0;
     if encoded {
         sample_encoded(texture, uv, lod, clamp)
@@ -153,20 +159,21 @@ fn texel(scene: &Scene, s: &Stage, p: &Point, clock: Clock, encoded: bool) -> Ve
     }
 }
 
-/// Encoded colour and alpha of a stage.
-fn stage_colour(scene: &Scene, s: &Stage, p: &Point, clock: Clock) -> Vec4 {
-    texel(scene, s, p, clock, true) * rgb_factor(s, p, clock).extend(alpha_factor(s, p, clock))
+/// Encoded colour and alpha of a stage. `mean`: its image's mean stands for the image.
+fn stage_colour(scene: &Scene, s: &Stage, p: &Point, clock: Clock, mean: bool) -> Vec4 {
+    texel(scene, s, p, clock, true, mean) * rgb_factor(s, p, clock).extend(alpha_factor(s, p, clock))
 }
 
 fn stages<'a>(scene: &'a Scene, material: &Material) -> &'a [Stage] {
     &scene.tables.stages[material.first_stage as usize..(material.first_stage + material.stage_count) as usize]
 }
 
-/// What the material does with light at a point.
-pub fn shade(scene: &Scene, material: &Material, p: &Point, clock: Clock) -> Shade {
-    let mut blending = Blending::default();
+/// What the material does with light at a point. `glossy`: glossy stages reflect.
+pub fn shade(scene: &Scene, material: &Material, p: &Point, clock: Clock, glossy: bool) -> Shade {
+    let mut blending = Blending::new(glossy);
     for s in stages(scene, material) {
-        blending.stage(s, stage_colour(scene, s, p, clock));
+        let mean = glossy && s.flags & STAGE_GLOSSY != 0;
+        blending.stage(s, stage_colour(scene, s, p, clock, mean));
     }
     blending.shade()
 }
@@ -178,14 +185,14 @@ pub fn tested_alpha(scene: &Scene, material: &Material, p: &Point, clock: Clock)
         return sample(texture, p.uv, 0.0, material.flags & MATERIAL_CLAMP != 0).w;
     }
     let s = &scene.tables.stages[material.alpha_stage as usize];
-    texel(scene, s, p, clock, false).w * alpha_factor(s, p, clock)
+    texel(scene, s, p, clock, false, false).w * alpha_factor(s, p, clock)
 }
 
 /// What the stages that shine show, linear: emission without its factor.
 pub fn shining(scene: &Scene, material: &Material, p: &Point, clock: Clock) -> Vec3 {
     let mut sum = Vec3::ZERO;
     for s in stages(scene, material).iter().filter(|s| s.flags & STAGE_EMISSION != 0) {
-        let c = texel(scene, s, p, clock, false);
+        let c = texel(scene, s, p, clock, false, false);
         let alpha = if s.source == BLEND_SRC_ALPHA {
             c.w * alpha_factor(s, p, clock)
         } else {

@@ -1,12 +1,13 @@
 //! Images by the CPU tracer.
 
-use super::direct::{RayCounts, SampleAddress, direct_light};
-use super::layers::see;
+use super::branches::{Path, lobe_of};
+use super::direct::{RayCounts, SampleAddress, direct_light, lobe_light};
+use super::layers::{Branches, Seen, see};
 use super::primary::{CameraRay, View};
 use super::surface::SurfaceHit;
 use super::trace::Tracer;
 use crate::render::film::{Aovs, Film};
-use crate::render::settings::{AmbientLight, Settings};
+use crate::render::settings::{AmbientLight, Secondary, Settings};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use crate::scene::records::NONE;
@@ -85,7 +86,7 @@ impl<'a> CpuRenderer<'a> {
         View::new(camera, size, hit.map_or(DEFAULT_FOCUS, |h| h.t as f32))
     }
 
-    /// Radiance along a ray.
+    /// Radiance of an eye ray, all that branches off it included.
     fn radiance(
         &self,
         tracer: &Tracer,
@@ -96,23 +97,53 @@ impl<'a> CpuRenderer<'a> {
         counts: &mut RayCounts,
     ) -> SampleRadiance {
         counts.primary += 1;
-        let seen = see(self.scene, tracer, settings, ray, cone, address);
+        let scene = self.scene;
+        let mut branches = Branches::default();
+        let eye = Path::from_eye(ray, address);
+        let seen = see(scene, tracer, settings, &eye, cone, &mut branches);
         let mut out = SampleRadiance {
             emission: seen.share * seen.emission,
             transparent: seen.layers,
             ..SampleRadiance::default()
         };
-        let Some((surface, _)) = seen.surface.filter(|(s, _)| s.albedo != Vec3::ZERO) else {
-            return out;
-        };
-        if settings.illumination {
-            let lit = direct_light(self.scene, tracer, settings, &surface, address, counts);
-            out.direct = seen.share * (surface.albedo * (lit + ambient_light(self.scene, settings, &surface)));
-        } else {
-            out.direct = seen.share * surface.albedo;
-            out.emission = Vec3::ZERO;
+        if let Some((surface, _)) = seen.surface.filter(|(s, _)| s.albedo != Vec3::ZERO) {
+            if settings.illumination {
+                let lit = direct_light(scene, tracer, settings, &surface, address, counts);
+                out.direct = seen.share * (surface.albedo * (lit + ambient_light(scene, settings, &surface)));
+            } else {
+                out.direct = seen.share * surface.albedo;
+                out.emission = Vec3::ZERO;
+            }
+        }
+        out.transparent += self.highlight(tracer, settings, &seen, address, counts);
+        while let Some(path) = branches.paths.pop() {
+            let seen = see(scene, tracer, settings, &path, cone, &mut branches);
+            out.transparent += seen.layers + seen.share * seen.emission;
+            if let Some((surface, _)) = seen.surface.filter(|(s, _)| s.albedo != Vec3::ZERO) {
+                let lit = direct_light(scene, tracer, settings, &surface, path.address, counts);
+                out.transparent += seen.share * (surface.albedo * (lit + ambient_light(scene, settings, &surface)));
+            }
+            out.transparent += self.highlight(tracer, settings, &seen, path.address, counts);
         }
         out
+    }
+
+    /// What the lobe of a seen surface reflects of the lights, as far as light samples find them.
+    fn highlight(
+        &self,
+        tracer: &Tracer,
+        settings: &Settings,
+        seen: &Seen,
+        address: SampleAddress,
+        counts: &mut RayCounts,
+    ) -> Vec3 {
+        let Some((surface, _)) = seen.surface.filter(|_| seen.glossy) else {
+            return Vec3::ZERO;
+        };
+        let material = &self.scene.materials[surface.material as usize];
+        let lobe = lobe_of(material, &surface, seen.direction);
+        let light = lobe_light(self.scene, tracer, settings, &surface, &lobe, address, counts);
+        seen.share * surface.specular * light
     }
 
     /// Mean of independent samples `range` of every pixel. `progress` is called with the share done, 0..1, from any
@@ -127,7 +158,7 @@ impl<'a> CpuRenderer<'a> {
     ) -> (Film, RayCounts) {
         let (width, height) = size;
         let view = self.view(camera, size, settings);
-        let tracer = self.tracer.at(self.scene, settings.clock, camera.eye.into());
+        let tracer = self.tracer.at(self.scene, settings, camera.eye.into());
         let cone = if settings.filter_textures {
             view.pixel_width
         } else {
@@ -177,9 +208,10 @@ impl<'a> CpuRenderer<'a> {
     /// Geometry through pixel centres.
     pub fn aovs(&self, camera: &Camera, size: (u32, u32), settings: &Settings) -> Aovs {
         let view = View::new(camera, size, 1.0);
-        let tracer = self.tracer.at(self.scene, settings.clock, camera.eye.into());
+        let tracer = self.tracer.at(self.scene, settings, camera.eye.into());
         let settings = &Settings {
             choose_layers: false,
+            secondary: Secondary::Off,
             ..*settings
         };
         let cone = if settings.filter_textures {
@@ -192,7 +224,8 @@ impl<'a> CpuRenderer<'a> {
             .map(|i| {
                 let ray = view.through((i % size.0) as f32 + 0.5, (i / size.0) as f32 + 0.5);
                 let address = SampleAddress { pixel: i, index: 0 };
-                let seen = see(self.scene, &tracer, settings, ray, cone, address);
+                let path = Path::from_eye(ray, address);
+                let seen = see(self.scene, &tracer, settings, &path, cone, &mut Branches::default());
                 seen.surface.map(|(surface, hit)| (surface, hit.t as f32))
             })
             .collect();

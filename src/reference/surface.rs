@@ -33,6 +33,8 @@ pub struct SurfaceHit {
     pub glow: Vec3,
     /// Share of what is behind that shows through.
     pub through: Vec3,
+    /// Share of what it reflects as a mirror or in its lobe; until [`super::layers`] has looked at it, at normal incidence.
+    pub specular: Vec3,
     pub material: u32,
     pub triangle: u32,
     /// The ray met the side that the surface's normals point to.
@@ -55,6 +57,7 @@ impl SurfaceHit {
             albedo: Vec3::ONE,
             glow: Vec3::ZERO,
             through: Vec3::ZERO,
+            specular: Vec3::ZERO,
             material: NONE,
             triangle: NONE,
             front: true,
@@ -195,11 +198,12 @@ fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction:
             albedo: Vec3::ZERO,
             glow: Vec3::ZERO,
             through: Vec3::ZERO,
+            specular: Vec3::ZERO,
         };
     }
     if material.flags & MATERIAL_STAGES != 0 {
         let point = stage_point(scene, tracer, place, hit, direction, cone);
-        return shade(scene, material, &point, tracer.clock);
+        return shade(scene, material, &point, tracer.clock, tracer.glossy);
     }
     let texture = &scene.textures[material.texture as usize];
     let lod = if cone > 0.0 {
@@ -222,6 +226,7 @@ fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction:
         albedo: sample(texture, uv, lod, material.flags & MATERIAL_CLAMP != 0).xyz(),
         glow: Vec3::ZERO,
         through: Vec3::ZERO,
+        specular: Vec3::ZERO,
     }
 }
 
@@ -251,6 +256,7 @@ pub fn surface_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, co
         albedo: shade.albedo,
         glow: shade.glow,
         through: shade.through,
+        specular: shade.specular,
         material: triangle.material,
         triangle: hit.triangle,
         front: place.front,
@@ -331,7 +337,7 @@ fn sky_seen(scene: &Scene, material: &Material, direction: Vec3, clock: Clock, s
             distance: CLOUD_DISTANCE,
             ..Point::on_texture(uv, d * CLOUD_DISTANCE, -d)
         };
-        let clouds = shade(scene, material, &point, clock);
+        let clouds = shade(scene, material, &point, clock, false);
         picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
     }
     let scale = match shown {

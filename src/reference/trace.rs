@@ -2,12 +2,15 @@
 
 use super::program::tested_alpha;
 use super::surface::point_at;
+use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::bvh::build_cwbvhs;
 use crate::scene::clock::Clock;
 use crate::scene::dynamic_geometry::{self, Moved};
 use crate::scene::entity_geometry::Placement;
-use crate::scene::records::{Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material};
+use crate::scene::records::{
+    Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material, NONE,
+};
 use glam::{DVec3, Vec3};
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
@@ -38,6 +41,10 @@ pub struct Tracer {
     trees: Arc<Vec<CwBvh>>,
     pub instances: Vec<Instance>,
     pub clock: Clock,
+    /// Glossy stages reflect.
+    pub glossy: bool,
+    /// Light of each triangle, or [`NONE`].
+    lights: Arc<Vec<u32>>,
     /// Dynamic vertices at the moment.
     moved: Vec<Moved>,
 }
@@ -112,18 +119,28 @@ impl Tracer {
             trees: Arc::new(build_cwbvhs(&scene.geometry)),
             instances: instances(scene, Clock::default()),
             clock: Clock::default(),
+            glossy: false,
+            lights: Arc::new(scene.lights.of_triangles(scene.geometry.triangles.len())),
             moved: moved(scene, Clock::default(), Vec3::ZERO),
         }
     }
 
     /// The same scene at another moment, seen from `eye`.
-    pub fn at(&self, scene: &Scene, clock: Clock, eye: Vec3) -> Self {
+    pub fn at(&self, scene: &Scene, settings: &Settings, eye: Vec3) -> Self {
+        let clock = settings.clock;
         Self {
             trees: self.trees.clone(),
             instances: instances(scene, clock),
             clock,
+            glossy: settings.reflects(),
+            lights: self.lights.clone(),
             moved: moved(scene, clock, eye),
         }
+    }
+
+    /// Number of the light that a triangle is.
+    pub fn light_of(&self, triangle: u32) -> Option<u32> {
+        Some(self.lights[triangle as usize]).filter(|l| *l != NONE)
     }
 
     fn vertex(&self, scene: &Scene, vertex: u32) -> Option<&Moved> {

@@ -16,6 +16,7 @@ use super::primary::Primary;
 use super::resample::Resample;
 use super::reuse::Reuse;
 use super::scene_gpu::SceneGpu;
+use super::secondary::Secondary;
 use super::settings::Settings;
 use super::taa::Taa;
 use super::temporal::Temporal;
@@ -66,6 +67,7 @@ pub struct FrameRenderer {
     primary: Primary,
     focus: Focus,
     direct: Direct,
+    secondary: Secondary,
     resample: Resample,
     reuse: Reuse,
     gradient: Gradient,
@@ -97,6 +99,7 @@ impl FrameRenderer {
             primary: Primary::new(&context)?,
             focus: Focus::new(&context)?,
             direct: Direct::new(&context)?,
+            secondary: Secondary::new(&context)?,
             resample: Resample::new(&context)?,
             reuse: Reuse::new(&context)?,
             gradient: Gradient::new(&context)?,
@@ -143,6 +146,9 @@ impl FrameRenderer {
         } else if let Some(reservoirs) = &mut view.reservoirs {
             reservoirs.forget();
         }
+        if constants.branches_off != 0 {
+            constants.secondary_pixels = view.secondary_pixels(&scene.device)?.buffer.address();
+        }
         view.constants[slot].write(0, &[constants])?;
         let push = Push {
             frame: view.constants[slot].address(),
@@ -177,7 +183,15 @@ impl FrameRenderer {
         if input.settings.aperture > 0.0 && input.settings.focus_distance <= 0.0 {
             self.focus.record(&mut r, &view.focus[slot])?;
         }
-        self.primary.record(&mut r, &view.focus[slot])?;
+        let listed = view.secondary_pixels.as_ref().filter(|_| constants.branches_off != 0);
+        if let Some(pixels) = listed {
+            pixels.clear(&mut r)?;
+        }
+        self.primary.record(&mut r, &view.focus[slot], listed)?;
+        if let Some(pixels) = listed {
+            self.secondary
+                .record(&mut r, pixels, &view.counters[slot], &view.focus[slot])?;
+        }
         let denoises = input.denoises();
         if denoises && constants.changed != 0 {
             self.gradient.record(&mut r, &view.counters[slot], &view.strata)?;
@@ -258,6 +272,9 @@ fn frame_constants(
         clock: s.clock.0,
         shown_emission: s.shown_emission as u32,
         max_depth: s.max_depth,
+        secondary: s.branches() as u32,
+        glossy: u32::from(s.reflects()),
+        branches_off: u32::from(scene.branches_off && s.branches() != super::settings::Secondary::Off),
         choose_layers: u32::from(s.choose_layers),
         ..base
     })

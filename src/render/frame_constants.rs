@@ -44,6 +44,10 @@ pub struct FrameConstants {
     /// Samples that the denoiser's gradients are taken of.
     pub strata: u64,
     pub counters: u64,
+    /// Pixels of which something branches off.
+    pub secondary_pixels: u64,
+    /// Light of each triangle, or NONE.
+    pub triangle_lights: u64,
     pub exposure: u64,
     pub focus: u64,
     pub srgb: u64,
@@ -140,8 +144,15 @@ pub struct FrameConstants {
     pub dynamic_triangles_count: u32,
     pub fog_count: u32,
     pub portal_count: u32,
-    /// Mirrors and portals that a ray goes through at most.
+    /// Mirrors, portals and interfaces that a ray is followed through at most.
     pub max_depth: u32,
+    /// What is followed at interfaces: [`super::settings::Secondary`].
+    pub secondary: u32,
+    /// Glossy stages reflect.
+    pub glossy: u32,
+    /// The scene has surfaces that something branches off at, and this frame follows it.
+    pub branches_off: u32,
+    pub padding_: u32,
 }
 
 /// Push constants of every pass.

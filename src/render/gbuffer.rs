@@ -5,7 +5,7 @@ use ash::vk;
 use std::sync::Arc;
 
 /// Name and format of every image, in the order of their bindings in set 1.
-const IMAGES: [(&str, vk::Format); 21] = [
+const IMAGES: [(&str, vk::Format); 22] = [
     ("albedo", vk::Format::R32G32B32A32_SFLOAT),
     ("position", vk::Format::R32G32B32A32_SFLOAT),
     ("surface", vk::Format::R32G32B32A32_UINT),
@@ -27,6 +27,7 @@ const IMAGES: [(&str, vk::Format); 21] = [
     ("share", vk::Format::R32G32B32A32_SFLOAT),
     ("layers", vk::Format::R32G32B32A32_SFLOAT),
     ("mean layers", vk::Format::R32G32B32A32_SFLOAT),
+    ("secondary", vk::Format::R32G32B32A32_SFLOAT),
 ];
 
 /// Name and format of every image that the next frame reads too: this frame's and the one before's stand side by side in set
@@ -105,7 +106,8 @@ accessors!(
     gradient_b = 17,
     share = 18,
     layers = 19,
-    mean_layers = 20;
+    mean_layers = 20,
+    secondary = 21;
     guide = 0,
     irradiance = 1,
     moments = 2,

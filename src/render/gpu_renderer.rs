@@ -3,7 +3,7 @@
 use super::film::{Aovs, Film};
 use super::frame::{FrameInput, FrameRenderer};
 use super::scene_gpu::{RenderError, SceneGpu};
-use super::settings::Settings;
+use super::settings::{Secondary, Settings};
 use super::view_state::ViewState;
 use crate::gpu::{GpuError, Image};
 use crate::reference::direct::RayCounts;
@@ -130,6 +130,7 @@ impl<'a> GpuRenderer<'a> {
             aperture: 0.0,
             random_lights: 1,
             choose_layers: false,
+            secondary: Secondary::Off,
             ..*settings
         };
         self.accumulate_one(&mut view, camera, &still, 0, 1)?;

@@ -25,6 +25,7 @@ pub mod resample;
 pub mod reservoirs;
 pub mod reuse;
 pub mod scene_gpu;
+pub mod secondary;
 pub mod settings;
 pub mod strata;
 pub mod taa;

@@ -5,8 +5,8 @@ use super::frame_constants::Push;
 use super::gbuffer::GBuffer;
 use super::scene_gpu::SceneGpu;
 use crate::gpu::{
-    Commands, ComputePipeline, ComputePipelineDesc, DescriptorLayout, DescriptorSets, Device, GpuError, PipelineCache,
-    Timestamps, Tracker, Use, shader_table,
+    Buffer, Commands, ComputePipeline, ComputePipelineDesc, DescriptorLayout, DescriptorSets, Device, GpuError,
+    PipelineCache, Timestamps, Tracker, Use, shader_table,
 };
 use std::sync::Arc;
 
@@ -90,12 +90,33 @@ impl Pass {
         uses: &[Use<'_>],
         groups: [u32; 3],
     ) -> Result<(), GpuError> {
+        self.run(label, r, uses, |cmd| self.pipeline.dispatch(cmd, groups))
+    }
+
+    /// Records the pass with as many work groups as the first three words of a buffer say when it runs.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn record_indirect(&self, r: &mut Recorder<'_>, uses: &[Use<'_>], groups: &Buffer) -> Result<(), GpuError> {
+        self.run(self.name, r, uses, |cmd| {
+            self.pipeline.dispatch_indirect(cmd, groups);
+            Ok(())
+        })
+    }
+
+    fn run(
+        &self,
+        label: &'static str,
+        r: &mut Recorder<'_>,
+        uses: &[Use<'_>],
+        dispatch: impl Fn(&Commands<'_>) -> Result<(), GpuError>,
+    ) -> Result<(), GpuError> {
         r.tracker.pass(r.cmd, uses)?;
         let sets = [r.scene_sets.raw(0), r.gbuffer.sets.raw(r.gbuffer.parity)];
         let run = |cmd: &Commands<'_>| {
             self.pipeline.bind(cmd, &sets)?;
             self.pipeline.push(cmd, &r.push)?;
-            self.pipeline.dispatch(cmd, groups)
+            dispatch(cmd)
         };
         match r.timestamps {
             Some(timestamps) => timestamps.scope(r.cmd, label, run),

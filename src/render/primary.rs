@@ -2,6 +2,7 @@
 //! Shader: `shaders/primary.comp`.
 
 use super::pass::{Pass, PassContext, Recorder};
+use super::secondary::SecondaryPixels;
 use crate::gpu::{Access, Buffer, GpuError, Use};
 
 /// The pass.
@@ -16,13 +17,19 @@ impl Primary {
         Pass::new(context, "primary", true).map(Self)
     }
 
-    /// Records the pass.
+    /// Records the pass. `secondary`: where pixels are listed of which something branches off.
     ///
     /// # Errors
     /// [`GpuError`] of the device.
-    pub fn record(&self, r: &mut Recorder<'_>, focus: &Buffer) -> Result<(), GpuError> {
+    pub fn record(
+        &self,
+        r: &mut Recorder<'_>,
+        focus: &Buffer,
+        secondary: Option<&SecondaryPixels>,
+    ) -> Result<(), GpuError> {
         let g = r.gbuffer;
         let mut uses = vec![Use::buffer(focus, Access::ComputeRead)];
+        uses.extend(secondary.map(|pixels| Use::buffer(&pixels.buffer, Access::ComputeReadWrite)));
         for image in [
             g.albedo(),
             g.position(),
@@ -33,6 +40,7 @@ impl Primary {
             g.emission(),
             g.share(),
             g.layers(),
+            g.secondary(),
             g.guide().now(g.parity),
         ] {
             uses.push(Use::image(image, Access::ComputeWrite));

@@ -15,7 +15,9 @@ use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
 use crate::scene::entity_geometry::Placement;
-use crate::scene::records::{Instance, Light, MATERIAL_FILTER, NONE, TextureInfo};
+use crate::scene::records::{
+    Instance, Light, MATERIAL_DIELECTRIC, MATERIAL_FILTER, MATERIAL_GLOSSY, NONE, TextureInfo,
+};
 use crate::scene::static_geometry::Mesh;
 use ash::vk;
 use std::sync::Arc;
@@ -83,6 +85,10 @@ pub struct SceneGpu {
     first_dynamic_vertex: u32,
     /// The scene has layers that tint light.
     pub light_filters: bool,
+    /// The scene has surfaces that something branches off at.
+    pub branches_off: bool,
+    /// Light of each triangle, or [`NONE`].
+    pub triangle_lights: Buffer,
     pub moving: Moving,
     pub name: String,
     /// Where meshes stand, and how they move.
@@ -203,6 +209,8 @@ impl SceneGpu {
         let lights = buffer!("lights", &scene.lights.lights, none);
         let light_nodes = buffer!("light nodes", &scene.lights.tree.nodes, none);
         let light_weights = buffer!("light weights", &scene.lights.weights, none);
+        let of_triangles = scene.lights.of_triangles(g.triangles.len());
+        let triangle_lights = buffer!("triangle lights", &of_triangles, none);
         let light_cells = buffer!("light cells", &scene.cells.slots, none);
         let cell_entries = buffer!("light cell entries", &scene.cells.entries, none);
         let cell_bounds = buffer!("light cell bounds", &scene.cells.bounds, none);
@@ -308,6 +316,11 @@ impl SceneGpu {
             placements: scene.placements.clone(),
             meshes: scene.geometry.meshes.clone(),
             light_filters: scene.materials.iter().any(|m| m.flags & MATERIAL_FILTER != 0),
+            branches_off: scene
+                .materials
+                .iter()
+                .any(|m| m.flags & (MATERIAL_DIELECTRIC | MATERIAL_GLOSSY) != 0),
+            triangle_lights: take(triangle_lights)?,
             instances: take(instance_records)?,
             instance_count,
             lights: take(lights)?,
@@ -413,6 +426,7 @@ impl SceneGpu {
             lights: self.lights.address(),
             light_nodes: self.light_nodes.address(),
             light_weights: self.light_weights.address(),
+            triangle_lights: self.triangle_lights.address(),
             light_cells: self.light_cells.address(),
             cell_entries: self.cell_entries.address(),
             cell_bounds: self.cell_bounds.address(),

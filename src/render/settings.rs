@@ -49,6 +49,18 @@ pub enum ShownEmission {
     Radiance = 1,
 }
 
+/// Which ways light takes at a smooth interface are followed, where it is both reflected and refracted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Secondary {
+    /// Neither: surfaces are what their stages show.
+    Off = 0,
+    /// One at random: noise, and no more rays than without.
+    One = 1,
+    /// Both.
+    Both = 2,
+}
+
 /// What the estimators and the output stage are asked to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -102,8 +114,11 @@ pub struct Settings {
     /// Select texture levels by the ray's footprint; else level 0.
     pub filter_textures: bool,
     pub shown_emission: ShownEmission,
-    /// Mirrors and portals that a ray goes through at most.
+    /// Mirrors, portals and interfaces that a ray is followed through at most.
     pub max_depth: u32,
+    pub secondary: Secondary,
+    /// Environment-mapped stages reflect; else they show their picture.
+    pub glossy: bool,
     /// Shade lit layers, one of them and what is behind at random; else only what is behind.
     pub choose_layers: bool,
     /// The scene's time.
@@ -111,6 +126,20 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// What is followed at interfaces: nothing where light is not asked for.
+    pub fn branches(&self) -> Secondary {
+        if self.illumination {
+            self.secondary
+        } else {
+            Secondary::Off
+        }
+    }
+
+    /// Whether environment-mapped stages reflect.
+    pub fn reflects(&self) -> bool {
+        self.glossy && self.branches() != Secondary::Off
+    }
+
     /// Whether a frame that is shown as it comes reuses light samples: it takes one random light by resampling.
     pub fn reuses(&self) -> bool {
         self.light_reuse
@@ -130,8 +159,8 @@ impl Settings {
     pub fn shown_levels(&self) -> u32 {
         let levels = self.atrous_levels.min(MOST_LEVELS);
         match self.view.checked_sub(FIRST_LEVEL_VIEW) {
-            Some(level) => (level + 1).min(levels),
-            None => levels,
+            Some(level) if level < MOST_LEVELS => (level + 1).min(levels),
+            _ => levels,
         }
     }
 }
@@ -168,6 +197,8 @@ impl Default for Settings {
             filter_textures: true,
             shown_emission: ShownEmission::Game,
             max_depth: 5,
+            secondary: Secondary::Both,
+            glossy: true,
             choose_layers: true,
             clock: Clock::default(),
         }

@@ -5,6 +5,7 @@ use super::gbuffer::GBuffer;
 use super::history::FrameHistory;
 use super::moving::Moving;
 use super::reservoirs::Reservoirs;
+use super::secondary::SecondaryPixels;
 use super::strata::Strata;
 use crate::gpu::{Buffer, DescriptorLayout, Device, GpuError, MemoryKind, Tracker};
 use crate::reference::direct::RayCounts;
@@ -27,6 +28,8 @@ pub struct ViewState {
     pub counters: Vec<Buffer>,
     /// Made when samples are first reused.
     pub reservoirs: Option<Reservoirs>,
+    /// Made when a frame first shows a scene where something branches off.
+    pub secondary_pixels: Option<SecondaryPixels>,
     pub strata: Strata,
     pub history: FrameHistory,
     /// Made when a frame first shows a scene in which something moves.
@@ -74,6 +77,7 @@ impl ViewState {
             focus,
             counters,
             reservoirs: None,
+            secondary_pixels: None,
             strata: Strata::new(device, size)?,
             history: FrameHistory::default(),
             moving: None,
@@ -91,6 +95,18 @@ impl ViewState {
             None => Reservoirs::new(device, self.gbuffer.size)?,
         };
         Ok(self.reservoirs.insert(made))
+    }
+
+    /// The list of pixels for the secondary stage, made if there is none yet.
+    ///
+    /// # Errors
+    /// [`GpuError`], out of memory above all.
+    pub fn secondary_pixels(&mut self, device: &Arc<Device>) -> Result<&SecondaryPixels, GpuError> {
+        let made = match self.secondary_pixels.take() {
+            Some(made) => made,
+            None => SecondaryPixels::new(device, self.gbuffer.size)?,
+        };
+        Ok(self.secondary_pixels.insert(made))
     }
 
     /// Reads and clears the counters of a frame that has ended.

@@ -14,6 +14,8 @@ pub struct Shade {
     pub glow: Vec3,
     /// Share of the background that shows through; above 1 where blending brightens it.
     pub through: Vec3,
+    /// Reflectance of the glossy lobe at normal incidence.
+    pub specular: Vec3,
 }
 
 /// Stages blended so far, encoded. Counterpart of `blend_stage` and `blended` in `shaders/include/program.glsl`.
@@ -27,6 +29,10 @@ pub struct Blending {
     /// What is left of the background: a colour as encoded values multiply it, and a share by alpha.
     through: Vec3,
     share: f32,
+    /// Reflectance of glossy stages.
+    specular: Vec3,
+    /// Glossy stages reflect; else they are pictures like others.
+    glossy: bool,
 }
 
 impl Default for Blending {
@@ -37,6 +43,8 @@ impl Default for Blending {
             add: Vec3::ZERO,
             through: Vec3::ONE,
             share: 1.0,
+            specular: Vec3::ZERO,
+            glossy: false,
         }
     }
 }
@@ -46,6 +54,14 @@ fn decode(c: Vec3) -> Vec3 {
 }
 
 impl Blending {
+    /// Nothing blended yet. `glossy`: glossy stages reflect.
+    pub fn new(glossy: bool) -> Self {
+        Self {
+            glossy,
+            ..Self::default()
+        }
+    }
+
     /// Blends a stage of encoded colour and alpha `c`.
     pub fn stage(&mut self, s: &Stage, c: Vec4) {
         let (rgb, alpha) = (c.xyz(), c.w);
@@ -70,6 +86,21 @@ impl Blending {
             _ => {}
         }
         let coloured = from_there != Vec3::ZERO || s.source == BLEND_DST_COLOR || s.destination == BLEND_SRC_COLOR;
+        let e = rgb * own;
+        if self.glossy && s.flags & STAGE_GLOSSY != 0 {
+            // What the stage shows is a reflection, also where it multiplies what is there.
+            let base = self.lit + self.over + self.add;
+            self.specular = (self.specular * keep + e + base * from_there.max(Vec3::ZERO)).clamp(Vec3::ZERO, Vec3::ONE);
+            self.lit *= keep;
+            self.over *= keep;
+            self.add *= keep;
+            if coloured {
+                self.through *= (Vec3::splat(keep) + from_there).max(Vec3::ZERO);
+            } else {
+                self.share *= keep;
+            }
+            return;
+        }
         if lit && coloured {
             // Light multiplies all that is there.
             self.lit += self.over + self.add;
@@ -80,12 +111,12 @@ impl Blending {
         self.lit *= k;
         self.over *= k;
         self.add *= k;
+        self.specular *= k.clamp(Vec3::ZERO, Vec3::ONE);
         if coloured {
             self.through *= k;
         } else {
             self.share *= keep;
         }
-        let e = rgb * own;
         if lit {
             self.lit += e;
         } else if s.flags & STAGE_EMISSION == 0 {
@@ -122,6 +153,7 @@ impl Blending {
             albedo: laid(self.lit),
             glow: glow * UNLIT,
             through: decode(self.through) * self.share,
+            specular: decode(self.specular),
         }
     }
 }

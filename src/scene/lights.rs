@@ -102,6 +102,17 @@ impl LightTable {
         self.reach.push(reach);
     }
 
+    /// Light that each of `count` triangles is, or [`NONE`].
+    pub fn of_triangles(&self, count: usize) -> Vec<u32> {
+        let mut out = vec![NONE; count];
+        for (i, light) in self.lights.iter().enumerate() {
+            if light.kind == LIGHT_TRIANGLE && light.triangle != NONE {
+                out[light.triangle as usize] = i as u32;
+            }
+        }
+        out
+    }
+
     /// Number of lights by source.
     pub fn count(&self, source: LightSource) -> usize {
         self.sources.iter().filter(|s| **s == source).count()

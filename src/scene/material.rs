@@ -4,17 +4,20 @@
 
 use super::dynamic_geometry;
 use super::emission::{Emission, emission_colour, normalised, normalised_texture};
+use super::optics;
 use super::program::{Program, UNLIT};
 use super::records::{
-    Deform, MATERIAL_ALPHA_TESTED, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_FILTER, MATERIAL_LAYER,
-    MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_PORTAL, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES,
-    MATERIAL_TWO_SIDED_EMISSION, Material, NONE, Stage as StageRecord, TcMod,
+    Deform, MATERIAL_ALPHA_TESTED, MATERIAL_BACK, MATERIAL_CLAMP, MATERIAL_DIELECTRIC, MATERIAL_FILTER,
+    MATERIAL_GLOSSY, MATERIAL_LAYER, MATERIAL_MOVING_EMISSION, MATERIAL_NO_FRONT, MATERIAL_PANE, MATERIAL_PORTAL,
+    MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION, Material, NONE, Stage as StageRecord,
+    TcMod,
 };
 use super::textures::{CHECKER, TextureRequests, WHITE};
 use crate::assets::bsp::lumps::surface_flags;
 use crate::assets::image::Texture;
 use crate::assets::shader_script::{
-    AlphaFunc, BlendFactor, Cull, Image, Shader, ShaderLibrary, SkyParms, Sort, Stage, StageTexture, Sun, TcGen,
+    AlphaFunc, BlendFactor, Cull, Image, Shader, ShaderLibrary, SkyParms, Sort, Stage, StageTexture, Sun, SurfaceParm,
+    TcGen,
 };
 use glam::Vec3;
 
@@ -69,11 +72,11 @@ pub struct MaterialSource {
     /// Image that shows where an emitter glows.
     glow: u32,
     clamp: bool,
-    alpha_func: Option<AlphaFunc>,
-    sky_box: Option<[u32; 6]>,
+    pub alpha_func: Option<AlphaFunc>,
+    pub sky_box: Option<[u32; 6]>,
     pub two_sided: bool,
     pub autosprite: bool,
-    cull: Cull,
+    pub cull: Cull,
     /// Distance along its normals that a surface stands off its place, units.
     pub lift: f32,
     pub program: Program,
@@ -82,6 +85,10 @@ pub struct MaterialSource {
     /// Changes of the geometry.
     pub deforms: Vec<Deform>,
     /// Height of a sky's clouds, units.
+    /// Reflects and bends like glass or water.
+    pub dielectric: Option<Dielectric>,
+    /// Of its environment-mapped stages, 0..1.
+    pub roughness: f32,
     cloud_height: f32,
     emission: Option<EmissionSource>,
     pub suns: Vec<Sun>,
@@ -188,6 +195,8 @@ impl MaterialSource {
                 portal: false,
                 deforms: Vec::new(),
                 cloud_height: SkyParms::DEFAULT_CLOUD_HEIGHT,
+                dielectric: None,
+                roughness: optics::ROUGHNESS,
                 emission: None,
                 suns: Vec::new(),
                 sky_light: None,
@@ -243,6 +252,8 @@ impl MaterialSource {
                 .sky
                 .as_ref()
                 .map_or(SkyParms::DEFAULT_CLOUD_HEIGHT, |sky| sky.cloud_height),
+            dielectric: dielectric(shader, visibility),
+            roughness: shader.roughness.unwrap_or(optics::ROUGHNESS),
             emission: shader.emits().map(|value| EmissionSource {
                 value,
                 // Where nothing tells which part of the surface glows, a colour given apart means all of it.
@@ -285,16 +296,6 @@ impl MaterialSource {
         self.colour
     }
 
-    /// Has an alpha test.
-    pub fn tests_alpha(&self) -> bool {
-        self.alpha_func.is_some()
-    }
-
-    /// Is drawn on other sides than its front alone.
-    pub fn culls_otherwise(&self) -> bool {
-        self.cull != Cull::FrontSided
-    }
-
     /// What the surface emits.
     pub fn emission(&self) -> Option<Emission> {
         let source = self.emission?;
@@ -324,7 +325,15 @@ impl MaterialSource {
             cloud_height: self.cloud_height,
             first_deform: tables.deforms.len() as u32,
             deform_count: self.deforms.len() as u32,
+            ior: self.dielectric.map_or(0.0, |d| d.ior),
+            lobe: (self.roughness * self.roughness).clamp(optics::LEAST_ALPHA, 1.0),
         };
+        if let Some(d) = self.dielectric {
+            record.flags |= MATERIAL_DIELECTRIC | if d.pane { MATERIAL_PANE } else { 0 };
+        }
+        if self.program.glossy && self.visibility != Visibility::Sky {
+            record.flags |= MATERIAL_GLOSSY;
+        }
         tables.deforms.extend(&self.deforms);
         self.stage_record(&mut record, tables);
         if let Some(test) = self.alpha_func
@@ -452,6 +461,37 @@ impl MaterialSource {
         record.shown = [UNLIT; 3];
         record.emission = if clouds { scale * mean } else { scale }.into();
     }
+}
+
+/// A smooth surface of a medium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction behind the front over before it.
+    pub ior: f32,
+    /// Both sides of a pane in one surface.
+    pub pane: bool,
+}
+
+/// Water and slime, what is called glass, and what says so.
+fn dielectric(shader: &Shader, visibility: Visibility) -> Option<Dielectric> {
+    if shader.portal || !matches!(visibility, Visibility::Layer | Visibility::Opaque) {
+        return None;
+    }
+    if let Some(ior) = shader.ior {
+        let pane = shader.pane;
+        return (ior > 1.0 && ior.is_finite()).then_some(Dielectric { ior, pane });
+    }
+    let has = |parm| shader.surface_parms.contains(parm);
+    if has(SurfaceParm::Water) || has(SurfaceParm::Slime) {
+        let ior = optics::WATER;
+        return Some(Dielectric { ior, pane: false });
+    }
+    // Windows are brushes of which often only one side is drawn: each is a pane of its own.
+    let glass = shader.name.to_ascii_lowercase().contains("glass");
+    (glass && visibility == Visibility::Layer).then_some(Dielectric {
+        ior: optics::GLASS,
+        pane: true,
+    })
 }
 
 /// Layers and decals stand off the surface they lie on, later ones farther.

@@ -20,6 +20,7 @@ pub mod load;
 pub mod material;
 pub mod models;
 pub mod motion;
+pub mod optics;
 pub mod portals;
 pub mod program;
 pub mod records;

@@ -44,6 +44,8 @@ pub struct Program {
     pub animated: bool,
     /// What it emits changes with the clock.
     pub moving_emission: bool,
+    /// Some stage stands for a glossy reflection.
+    pub glossy: bool,
 }
 
 /// The record of a wave.
@@ -192,6 +194,7 @@ impl Program {
             out.animated |= moves(s, mods);
             out.moving_emission |= s.flags & STAGE_EMISSION != 0 && (moves(s, mods) || s.mod_count > 0);
         }
+        out.glossy = out.stages.iter().any(|s| s.flags & STAGE_GLOSSY != 0);
         let tested = drawn().position(|p| p.alpha_func.is_some());
         out.alpha_stage = tested.map(|i| i as u32).filter(|&i| !is_bare(&out.stages[i as usize]));
         out.plain = out.plain_texture();
@@ -247,7 +250,10 @@ impl Program {
             textures,
             frames,
             frame_rate,
-            flags: flag(lit, STAGE_LIT) | flag(clamps, STAGE_CLAMP) | flag(white, STAGE_WHITE),
+            flags: flag(lit, STAGE_LIT)
+                | flag(clamps, STAGE_CLAMP)
+                | flag(white, STAGE_WHITE)
+                | flag(tc_gen == TC_ENVIRONMENT && !white, STAGE_GLOSSY),
             source: factor(blend.source),
             destination: factor(blend.destination),
             rgb_source,

@@ -57,6 +57,12 @@ pub const MATERIAL_NO_FRONT: u32 = 512;
 pub const MATERIAL_PORTAL: u32 = 2048;
 /// `Material::flags`: emission is that of its stages as the clock has them.
 pub const MATERIAL_MOVING_EMISSION: u32 = 1024;
+/// `Material::flags`: a smooth interface that reflects by Fresnel's equations and bends what goes through.
+pub const MATERIAL_DIELECTRIC: u32 = 4096;
+/// `Material::flags`: of a dielectric: both sides of a pane in one surface; nothing bends.
+pub const MATERIAL_PANE: u32 = 8192;
+/// `Material::flags`: some stage is a glossy reflection.
+pub const MATERIAL_GLOSSY: u32 = 16384;
 
 /// Surface appearance as the tracer sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -88,6 +94,10 @@ pub struct Material {
     /// Deformations in their order.
     pub first_deform: u32,
     pub deform_count: u32,
+    /// Index of refraction of a dielectric: behind its front over before it.
+    pub ior: f32,
+    /// Width of the lobe of glossy stages: the square of their roughness.
+    pub lobe: f32,
 }
 
 /// `Deform::kind`: along the normal by `wave`, its phase growing by `a` periods a unit of x + y + z.
@@ -212,6 +222,8 @@ pub const STAGE_CLAMP: u32 = 2;
 pub const STAGE_EMISSION: u32 = 4;
 /// `Stage::flags`: its texture is plain white.
 pub const STAGE_WHITE: u32 = 8;
+/// `Stage::flags`: its image stands for what the surface reflects: its mean is the reflectance of a glossy lobe.
+pub const STAGE_GLOSSY: u32 = 16;
 
 /// `Stage::rgb_source` and `alpha_source`: `rgb` and `alpha` as they are.
 pub const SOURCE_CONSTANT: u32 = 0;

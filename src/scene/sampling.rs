@@ -21,6 +21,12 @@ pub const DIM_LENS: u32 = 1;
 pub const DIM_SHUTTER: u32 = 2;
 /// Which of a lit layer and what is behind it is shaded, at the i-th layer.
 pub const DIM_LAYER: u32 = 0x4000;
+/// Direction of light that a lobe reflects, at the i-th branch of a path.
+pub const DIM_LOBE: u32 = 0x5000;
+/// Choice of the light that a lobe is lit by.
+pub const DIM_LOBE_PICK: u32 = 0x6000;
+/// Position on it.
+pub const DIM_LOBE_POINT: u32 = 0x6001;
 /// Choice of the i-th random light, 64 of them.
 pub const DIM_LIGHT_PICK: u32 = 16;
 /// Position on the i-th random light, 64 of them.

@@ -15,7 +15,7 @@ use q3rays::reference::light_cells;
 use q3rays::render::film::Film;
 use q3rays::render::gpu_renderer::GpuRenderer;
 use q3rays::render::scene_gpu::SceneGpu;
-use q3rays::render::settings::Settings;
+use q3rays::render::settings::{Secondary, Settings};
 use q3rays::scene::Scene;
 use q3rays::scene::camera::Camera;
 use q3rays::scene::sampling::Sequence;
@@ -91,6 +91,8 @@ pub fn still(random_lights: u32, sequence: Sequence, seed: u32) -> Settings {
         seed,
         antialiasing: false,
         filter_textures: false,
+        // Ways that branch off have tests of their own (secondary.rs); here each ray has one end that can be explained.
+        secondary: Secondary::Off,
         ..Settings::default()
     }
 }

@@ -3,8 +3,9 @@
 
 use glam::Vec3;
 use q3rays::reference::CpuRenderer;
+use q3rays::reference::branches::Path;
 use q3rays::reference::direct::{RayCounts, SampleAddress, Taken, direct_light, point_sampling, taken_sample};
-use q3rays::reference::layers::{self, see};
+use q3rays::reference::layers::{self, Branches, see};
 use q3rays::reference::light_sample::{Target, sample_light};
 use q3rays::reference::surface::{SurfaceHit, classify, offset_point};
 use q3rays::render::settings::Settings;
@@ -92,7 +93,16 @@ impl Context<'_> {
         };
         let view = cpu.view(&self.camera, self.size, &self.settings);
         let ray = view.sample(&self.settings, x, y, address);
-        let own_seen = see(scene, &cpu.tracer, &self.settings, ray, view.pixel_width, address);
+        let path = Path::from_eye(ray, address);
+        let nothing_branches = &mut Branches::default();
+        let own_seen = see(
+            scene,
+            &cpu.tracer,
+            &self.settings,
+            &path,
+            view.pixel_width,
+            nothing_branches,
+        );
         let hit = own_seen.surface.map(|(_, hit)| hit);
         let triangle = hit.map_or(NONE, |h| h.triangle);
         let surface = own_seen.surface.map(|(surface, _)| surface);

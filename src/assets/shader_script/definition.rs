@@ -102,6 +102,12 @@ pub struct Shader {
     pub tess_size: Option<f32>,
     /// `light`: an old way to ask for a flare.
     pub light: Option<f32>,
+    /// `rt_ior`, q3rays' own: index of refraction of a solid that the surface bounds, or of a pane.
+    pub ior: Option<f32>,
+    /// `rt_pane`, q3rays' own: both sides of a pane in one surface.
+    pub pane: bool,
+    /// `rt_roughness`, q3rays' own: of environment-mapped stages, 0..1.
+    pub roughness: Option<f32>,
     /// `clampTime`: shader time stops at this many seconds.
     pub clamp_time: Option<f32>,
     pub editor: EditorParms,
@@ -137,6 +143,9 @@ impl Shader {
             fog: None,
             tess_size: None,
             light: None,
+            ior: None,
+            pane: false,
+            roughness: None,
             clamp_time: None,
             editor: EditorParms::default(),
             compiler: CompilerParms::default(),

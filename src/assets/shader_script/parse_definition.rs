@@ -66,6 +66,9 @@ fn parse_directive(reader: &mut Reader<'_>, shader: &mut Shader, token: &Token<'
             reader.rest_of_line();
         }
         "light" => shader.light = reader.number("light"),
+        "rt_ior" => shader.ior = reader.number("rt_ior"),
+        "rt_pane" => shader.pane = true,
+        "rt_roughness" => shader.roughness = reader.number("rt_roughness"),
         "clamptime" => shader.clamp_time = reader.number("clampTime"),
         _ if name.starts_with("qer") => parse_editor_directive(reader, shader, token, &name),
         _ => reader.reject_unknown("general", token),
