@@ -157,7 +157,7 @@ pub fn lobe_light(
         let share = own / (own + lobe.pdf(direction));
         weight *= if settings.soft_shadows { share } else { 0.0 };
     }
-    if !(weight > 0.0) {
+    if weight <= 0.0 || weight.is_nan() {
         return Vec3::ZERO;
     }
     estimator.traced(Some(sample), weight, counts)
