@@ -52,7 +52,7 @@ bool shoot(uvec2 pixel) {
     ivec2 p = ivec2(pixel);
     vec3 origin, direction;
     camera_ray(pixel, sample_index, origin, direction);
-    Seen seen = see(Path(origin, direction, vec3(1.0), 0.0, 0, pixel.x + (pixel.y << 16), -1.0, 0));
+    Seen seen = see(Path(origin, direction, vec3(1.0), 0.0, 0, pixel.x + (pixel.y << 16), -1.0, 0, 0));
     bool branches = branch_count != 0;
     if (FC.view == 23) imageStore(image_secondary, p, vec4(0.0));
     Hit hit = seen.hit;

@@ -11,7 +11,7 @@ use crate::render::scene_gpu::{RenderError, SceneGpu};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
-use crate::scene::camera::Camera;
+use crate::scene::camera::{Camera, Shot};
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
@@ -199,7 +199,7 @@ pub enum Prepared<'a> {
 
 /// An accumulation as it was asked for.
 pub struct Job<'a> {
-    pub camera: &'a Camera,
+    pub camera: Shot,
     pub size: (u32, u32),
     pub settings: &'a Settings,
     /// Numbers of the samples.

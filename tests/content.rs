@@ -55,6 +55,9 @@ fn all_files_together_are_small_and_every_shader_has_its_image() {
         );
     }
     for image in script.lines().filter_map(|line| line.trim().strip_prefix("map ")) {
+        if image.starts_with('$') {
+            continue;
+        }
         assert!(exists(image), "{image}");
     }
     for side in ["rt", "lf", "bk", "ft", "up", "dn"] {

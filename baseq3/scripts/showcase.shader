@@ -134,3 +134,30 @@ textures/showcase/grate
 		rgbGen identity
 	}
 }
+
+textures/showcase/glass
+{
+	surfaceparm trans
+	surfaceparm nolightmap
+	surfaceparm nomarks
+	cull none
+	rt_ior 1.5
+	{
+		map $whiteimage
+		blendFunc filter
+		rgbGen const ( 0.95 0.985 0.97 )
+	}
+}
+
+textures/showcase/mirror
+{
+	surfaceparm nolightmap
+	surfaceparm nomarks
+	portal
+	{
+		map $whiteimage
+		blendFunc filter
+		rgbGen const ( 0.97 0.97 0.97 )
+		depthWrite
+	}
+}

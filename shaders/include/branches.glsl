@@ -25,8 +25,9 @@ struct Path {
     // Of the direction, solid angle, where a lobe chose it; 0 where the lobe's surface takes no light samples; negative where
     // no lobe did.
     float pdf;
-    // Light row of the lobe's surface.
+    // Light row of the lobe's surface, and its place among light cells.
     uint row;
+    uint place;
 };
 
 uint branch_address(uint address, uint n) {
@@ -109,12 +110,24 @@ void push_lobe(Path from, Material material, SurfaceHit s, vec3 direction, uint 
     vec3 back = sample_lobe(lobe, u, weight);
     if (weight <= 0.0 || dot(back, s.geometric_normal) <= 0.0) return;
     push_branch(Path(offset_point(s.position, s.geometric_normal), back, share * s.specular * weight, distance_,
-                     from.depth + 1, branch_address(from.address, n), sampled_ ? lobe_pdf(lobe, back) : 0.0, s.row));
+                     from.depth + 1, branch_address(from.address, n), sampled_ ? lobe_pdf(lobe, back) : 0.0, s.row,
+                     light_cell_place(s.position, s.geometric_normal)));
 }
 
-// Probability that a light of a row is chosen by power: 0 for lights outside it.
-float power_chance(uint row_, uint light) {
+// Probability that a light is chosen for a lobe: 0 for lights outside its row.
+float lobe_chance(uint row_, uint place, uint light) {
     LightRow row = FC.light_rows.at[FC.cull_lights == 0 ? FC.all_row : row_];
+    LightCell cell = lobe_cell(row_, place);
+    float weight = float(FC.light_weights.at[light + 1] - FC.light_weights.at[light]);
+    if (cell.count != 0) {
+        float sum = 0.0;
+        [[dont_unroll]] for (uint i = cell.first; i < cell.first + cell.count; i++) {
+            CellEntry e = FC.cell_entries.at[i];
+            if (light < e.first_light || light >= e.first_light + e.light_count) continue;
+            sum += e.light_count == 1 ? e.probability : e.probability * (weight / float(e.weight));
+        }
+        return sum;
+    }
     uint lo = 0;
     uint hi = row.run_count;
     [[dont_unroll]] while (lo < hi) {
@@ -123,12 +136,11 @@ float power_chance(uint row_, uint light) {
     }
     if (lo == 0 || row.weight == 0) return 0.0;
     LightRun run = FC.light_runs.at[row.first_run + lo - 1];
-    if (light >= run.first_light + run.count) return 0.0;
-    return float(FC.light_weights.at[light + 1] - FC.light_weights.at[light]) / float(row.weight);
+    return light >= run.first_light + run.count ? 0.0 : weight / float(row.weight);
 }
 #endif
 
-vec3 emission_met(float pdf, uint row, SurfaceHit s, Hit hit, vec3 direction) {
+vec3 emission_met(float pdf, Path path, SurfaceHit s, Hit hit, vec3 direction) {
 #ifdef FOLLOWS_BRANCHES
     if (pdf >= 0.0) {
         uint number = FC.triangle_lights.at[hit.triangle];
@@ -142,7 +154,7 @@ vec3 emission_met(float pdf, uint row, SurfaceHit s, Hit hit, vec3 direction) {
         float cosine = -dot(s.geometric_normal, direction);
         float weight = 1.0;
         if (pdf > 0.0 && FC.soft_shadows != 0 && cosine > 0.0) {
-            float other = power_chance(row, number) * hit.t * hit.t / (cosine * light.size);
+            float other = lobe_chance(path.row, path.place, number) * hit.t * hit.t / (cosine * light.size);
             weight = pdf / (pdf + other);
         }
         return glow + radiance * weight;

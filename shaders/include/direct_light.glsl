@@ -23,6 +23,7 @@ LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at, uin
 Lobe light_lobe;
 // The receiver's lobe alone is wanted.
 bool lobe_alone;
+const uint BRANCH_CANDIDATES = 4;
 // Radiance over Fresnel's factor that the lobe reflects, as far as light samples find it.
 vec3 lobe_light;
 
@@ -59,7 +60,13 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     bool resampled = !every && FC.light_sampling == SAMPLING_RESERVOIR;
     uint count = every ? row.light_count : FC.random_lights;
     // One light of several candidates is kept in proportion to what each gives without visibility.
-    uint n = resampled ? clamp(FC.light_candidates, 1, MAX_CANDIDATES) : 1;
+#ifdef LIGHTS_LOBES
+    // What branches off is not denoised.
+    uint candidates = FC.light_candidates * BRANCH_CANDIDATES;
+#else
+    uint candidates = FC.light_candidates;
+#endif
+    uint n = resampled ? clamp(candidates, 1, MAX_CANDIDATES) : 1;
     float share = every ? 1.0 : 1.0 / float(FC.random_lights);
     uint r = 0;
     uint in_run = 0;
@@ -84,8 +91,9 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
             uint points = point_sampling();
 #ifdef LIGHTS_LOBES
             if (for_lobe) {
-                if (row.weight == 0) continue;
-                choice = choose_power(row, random_bits(address, DIM_LOBE_PICK).x);
+                choice = choose_for_lobe(row, lobe_cell(at.row, light_cell_place(at.position, at.geometric_normal)),
+                                         random_bits(address, DIM_LOBE_PICK).x);
+                if (choice.light == NONE) continue;
                 dimension = DIM_LOBE_POINT;
                 if (points == POINTS_SOLID_ANGLE) points = POINTS_AREA;
             } else

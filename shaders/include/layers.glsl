@@ -87,7 +87,7 @@ Seen see(Path path) {
         uint reflection = REFLECTS_NOT;
         if (follows) reflection = split(material, s, direction, out_.share);
         else unsplit(s);
-        vec3 emission = emission_met(pdf, path.row, s, hit, direction);
+        vec3 emission = emission_met(pdf, path, s, hit, direction);
         vec4 there = fog_at(origin, direction, hit.t);
         out_.layers += out_.share * (there.rgb - fog.rgb);
         fog = there;
@@ -139,7 +139,7 @@ Seen see(Path path) {
                     vec3 start, back;
                     mirrored(s, direction, start, back);
                     push_branch(Path(start, back, share * s.specular, out_.distance, depth + 1,
-                                     branch_address(path.address, branch), -1.0, 0));
+                                     branch_address(path.address, branch), -1.0, 0, 0));
 #endif
                     branch++;
                 } else {

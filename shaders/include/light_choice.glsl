@@ -283,6 +283,18 @@ Choice choose_by_cell(LightCell cell, uint bits) {
     return Choice(lo, entry.probability * (float(weight) / float(entry.weight)));
 }
 
+// The light cell that lights for a lobe are chosen by.
+LightCell lobe_cell(uint row, uint place) {
+    if (FC.cull_lights == 0) return LightCell(0, 0, 0, 0);
+    return find_light_cell(row, place);
+}
+
+// The light of a lobe: by cell where there is one, else by power.
+Choice choose_for_lobe(LightRow row, LightCell cell, uint bits) {
+    if (cell.count != 0) return choose_by_cell(cell, bits);
+    return row.weight != 0 ? choose_power(row, bits) : NO_CHOICE;
+}
+
 // What lights are chosen by, for one receiver.
 struct Chances {
     LightRow row;

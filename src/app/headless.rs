@@ -63,7 +63,7 @@ pub fn run_frames(
             note("the CPU tracer has no frame loop: accumulating as many samples of the last view instead");
             let start = Instant::now();
             let still = Job {
-                camera: &path(count.saturating_sub(1)),
+                camera: (&path(count.saturating_sub(1))).into(),
                 size: job.size,
                 settings: job.settings,
                 range: 0..count,
@@ -97,9 +97,13 @@ pub fn run_frames(
         accumulated = if job.accumulate && still { accumulated + 1 } else { 0 };
         let input = FrameInput {
             camera,
-            settings: Settings {
-                clock: job.settings.clock.after(f64::from(index) * job.frame_time),
-                ..*job.settings
+            settings: if accumulated > 0 {
+                job.settings.at_sample(index)
+            } else {
+                Settings {
+                    clock: job.settings.clock.after(f64::from(index) * job.frame_time),
+                    ..*job.settings
+                }
             },
             sample_index: index,
             accumulated,

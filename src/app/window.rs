@@ -200,11 +200,16 @@ impl Shown {
         }
         let still = accumulate && !moved && before == (size.width, size.height);
         self.accumulated = if still { self.accumulated + 1 } else { 0 };
+        let now = Settings {
+            clock: Clock::from_seconds(self.time),
+            ..settings(cvars)
+        };
         let input = FrameInput {
             camera: self.camera,
-            settings: Settings {
-                clock: Clock::from_seconds(self.time),
-                ..settings(cvars)
+            settings: if self.accumulated > 0 {
+                now.at_sample(self.frame)
+            } else {
+                now
             },
             sample_index: self.frame,
             accumulated: self.accumulated,

@@ -4,7 +4,7 @@ use super::args::{CliError, CliResult};
 use super::common::{Common, progress};
 use crate::app::headless::{Loop, run_frames, run_stats};
 use crate::console::Cvars;
-use crate::console::settings::settings;
+use crate::console::settings::{FRAME_RATE, settings};
 use crate::engine::Job;
 use crate::output::stats::FrameStats;
 use crate::output::{OutputError, atomic, exr_file, picture};
@@ -12,7 +12,7 @@ use crate::reference::direct::RayCounts;
 use crate::render::film::{Aovs, Film};
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::scene::camera::Camera;
+use crate::scene::camera::{Camera, Shot};
 use crate::scene::clock::Clock;
 use crate::scene::spawns::{overview, view};
 use std::path::{Path, PathBuf};
@@ -31,6 +31,9 @@ pub struct Args {
         conflicts_with = "spawn"
     )]
     camera: Option<String>,
+    /// Where the camera is when the shutter closes, for rt_motionblur
+    #[arg(long, value_name = "X,Y,Z,PITCH,YAW[,ROLL]", allow_hyphen_values = true)]
+    camera_to: Option<String>,
     /// Spawn point to look from, counted from 0
     #[arg(long, value_name = "N")]
     spawn: Option<usize>,
@@ -189,6 +192,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     let (scene, _) = common.lit_scene(&args.map, &cvars)?;
     let settings = Settings {
         clock: Clock::from_seconds(args.time.unwrap_or(0.0)),
+        shutter: settings(&cvars).shutter * args.fps.map_or(1.0, |fps| FRAME_RATE / fps as f32),
         ..settings(&cvars)
     };
     let camera = camera(
@@ -197,6 +201,16 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         args.spawn,
         cvars.number("cg_fov") as f32,
     )?;
+    let shot = Shot {
+        open: camera,
+        close: match &args.camera_to {
+            Some(to) => self::camera(&scene, Some(to), None, camera.fov)?,
+            None => camera,
+        },
+    };
+    if shot.close != shot.open && settings.shutter == 0.0 {
+        eprintln!("warning: --camera-to moves the camera only where rt_motionblur keeps the shutter open");
+    }
     let spp = args.spp.unwrap_or(32);
     let range = args.first_sample..args.first_sample.saturating_add(spp);
     let engine = common.engine(&cvars)?;
@@ -217,7 +231,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         (run.film, run.frames)
     } else {
         let job = Job {
-            camera: &camera,
+            camera: shot,
             size: args.size,
             settings: &settings,
             range,

@@ -129,6 +129,14 @@ pub const CVARS: &[Cvar] = &[
         "environment-mapped stages reflect what is around; 0 shows the picture that the game puts there",
     ),
     int("rt_antialiasing", 1, 0, 1, "jitters the ray within the pixel"),
+    float(
+        "rt_motionblur",
+        0.0,
+        0.0,
+        1.0,
+        "share of a frame that the shutter is open where samples are averaged: --spp and rt_accumulate; a frame lasts as --fps \
+         says, else 1/60 s",
+    ),
     int("rt_dof", 0, 0, 1, "depth of field through a thin lens"),
     float("rt_aperture", 1.0, 0.0, 64.0, "lens radius for rt_dof, units"),
     float(

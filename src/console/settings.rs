@@ -15,6 +15,9 @@ pub fn lights(cvars: &Cvars) -> Lights {
     }
 }
 
+/// Frames a second that a shutter's share of a frame is reckoned by where nothing else is said.
+pub const FRAME_RATE: f32 = 60.0;
+
 /// The frame settings that the variables ask for.
 pub fn settings(cvars: &Cvars) -> Settings {
     let number = |name| cvars.number(name);
@@ -83,6 +86,7 @@ pub fn settings(cvars: &Cvars) -> Settings {
         glossy: on("rt_glossy"),
         choose_layers: true,
         clock: Clock::default(),
+        shutter: number("rt_motionblur") as f32 / FRAME_RATE,
     }
 }
 

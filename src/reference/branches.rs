@@ -2,11 +2,13 @@
 //! `shaders/include/branches.glsl`.
 
 use super::direct::{SampleAddress, light_row};
+use super::light_choice::LobeChances;
 use super::primary::CameraRay;
 use super::surface::{SurfaceHit, emission_seen, emitted, offset_point};
 use super::trace::{Hit, Tracer};
 use crate::render::settings::{Secondary, Settings, ShownEmission};
 use crate::scene::Scene;
+use crate::scene::light_cells::place;
 use crate::scene::light_power::luminance;
 use crate::scene::optics::{self, Lobe};
 use crate::scene::records::{MATERIAL_DIELECTRIC, MATERIAL_PANE, MATERIAL_TWO_SIDED_EMISSION, Material};
@@ -40,6 +42,8 @@ pub struct LobeStart {
     pub pdf: f32,
     /// Light row of its surface.
     pub row: u32,
+    /// Place of its surface among light cells.
+    pub place: u32,
 }
 
 impl Path {
@@ -180,6 +184,7 @@ pub fn lobe_path(
         lobe: Some(LobeStart {
             pdf: if sampled { lobe.pdf(out) } else { 0.0 },
             row: s.row,
+            place: place(s.position, s.geometric_normal),
         }),
     })
 }
@@ -213,7 +218,7 @@ pub fn emission_met(
     let mut weight = 1.0;
     if start.pdf > 0.0 && settings.soft_shadows && cosine > 0.0 {
         let (lists, row) = light_row(scene, settings, start.row);
-        let chance = super::light_choice::power_chance(&scene.lights, lists, row, number);
+        let chance = LobeChances::new(scene, settings, lists, row, start.place).chance(number);
         let t = hit.t as f32;
         let other = chance * t * t / (cosine * light.size);
         weight = start.pdf / (start.pdf + other);

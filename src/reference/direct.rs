@@ -1,6 +1,6 @@
 //! Direct light by next-event estimation. Counterpart of `shaders/direct.comp`.
 
-use super::light_choice::{Chances, choose_by_power};
+use super::light_choice::{Chances, LobeChances};
 use super::light_sample::{LightSample, PointSampling, Target, sample_light};
 use super::surface::{SurfaceHit, offset_point};
 use super::trace::Tracer;
@@ -8,6 +8,7 @@ use super::visibility::visible;
 use crate::render::settings::{LightSampling, Settings};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
+use crate::scene::light_cells::place;
 use crate::scene::light_power::luminance;
 use crate::scene::optics::Lobe;
 use crate::scene::records::LIGHT_TRIANGLE;
@@ -114,7 +115,7 @@ pub fn taken_sample(
     estimator.taken(&estimator.chances(), i, steps)
 }
 
-/// Radiance over Fresnel's factor that a surface's lobe reflects of one light, chosen by power and sampled by area; lights
+/// Radiance over Fresnel's factor that a surface's lobe reflects of one light, sampled by area; lights
 /// that the lobe's own directions find, too, are weighted by the balance heuristic.
 pub fn lobe_light(
     scene: &Scene,
@@ -132,7 +133,8 @@ pub fn lobe_light(
         PointSampling::Centre
     };
     let (lists, row) = light_row(scene, settings, at.row);
-    let Some(choice) = choose_by_power(&scene.lights, lists, row, estimator.bits(DIM_LOBE_PICK)[0]) else {
+    let chances = LobeChances::new(scene, settings, lists, row, place(at.position, at.geometric_normal));
+    let Some(choice) = chances.choose(estimator.bits(DIM_LOBE_PICK)[0]) else {
         return Vec3::ZERO;
     };
     let Some(sample) = estimator.sample(choice.light, DIM_LOBE_POINT) else {

@@ -12,7 +12,7 @@ use crate::scene::light_cells::{CellView, place};
 use crate::scene::light_power::luminance;
 use crate::scene::light_tree::LightTree;
 use crate::scene::lights::LightTable;
-use crate::scene::records::{Light, LightNode, LightRow, LightRun};
+use crate::scene::records::{CellEntry, Light, LightNode, LightRow, LightRun};
 use crate::scene::sampling::{pcg, unit};
 use glam::Vec3;
 
@@ -114,25 +114,59 @@ fn choose_power(sums: &[u32], row: LightRow, runs: &[LightRun], bits: u32) -> Ch
     }
 }
 
-/// Chooses from a row in proportion to power, whatever the way of choosing is elsewhere.
-pub fn choose_by_power(lights: &LightTable, lists: &LightLists, row: u32, bits: u32) -> Option<Choice> {
-    let record = lists.rows[row as usize];
-    let runs = &lists.runs[record.first_run as usize..(record.first_run + record.run_count) as usize];
-    (record.weight > 0).then(|| choose_power(&lights.weights, record, runs, bits))
+/// What the lights of a lobe are chosen by: the light cell of its surface, where there is one, else power.
+#[derive(Clone, Copy)]
+pub struct LobeChances<'a> {
+    lights: &'a LightTable,
+    row: LightRow,
+    runs: &'a [LightRun],
+    cell: CellView<'a>,
 }
 
-/// Probability that [`choose_by_power`] chooses a light: 0 for lights outside the row.
-pub fn power_chance(lights: &LightTable, lists: &LightLists, row: u32, light: u32) -> f32 {
-    let record = lists.rows[row as usize];
-    let runs = &lists.runs[record.first_run as usize..(record.first_run + record.run_count) as usize];
-    let at = runs.partition_point(|r| r.first_light <= light);
-    let listed = at
-        .checked_sub(1)
-        .is_some_and(|i| light < runs[i].first_light + runs[i].count);
-    if !listed || record.weight == 0 {
-        return 0.0;
+impl<'a> LobeChances<'a> {
+    /// `lists` and `row` are what culling leaves, `place` is [`place`] of the surface.
+    pub fn new(scene: &'a Scene, settings: &Settings, lists: &'a LightLists, row: u32, place: u32) -> Self {
+        let record = lists.rows[row as usize];
+        Self {
+            lights: &scene.lights,
+            row: record,
+            runs: &lists.runs[record.first_run as usize..(record.first_run + record.run_count) as usize],
+            cell: if settings.cull_lights > 0 {
+                scene.cells.find(row, place)
+            } else {
+                CellView::default()
+            },
+        }
     }
-    (lights.weights[light as usize + 1] - lights.weights[light as usize]) as f32 / record.weight as f32
+
+    /// Chooses with 32 random bits.
+    pub fn choose(&self, bits: u32) -> Option<Choice> {
+        if !self.cell.entries.is_empty() {
+            return Some(choose_by_cell(&self.lights.weights, self.cell, bits));
+        }
+        (self.row.weight > 0).then(|| choose_power(&self.lights.weights, self.row, self.runs, bits))
+    }
+
+    /// Probability that a light is chosen; 0 for lights outside the row.
+    pub fn chance(&self, light: u32) -> f32 {
+        let weight = (self.lights.weights[light as usize + 1] - self.lights.weights[light as usize]) as f32;
+        if !self.cell.entries.is_empty() {
+            let holds = |e: &&CellEntry| light >= e.first_light && light < e.first_light + e.light_count;
+            let share = |e: &CellEntry| match e.light_count {
+                1 => e.probability,
+                _ => e.probability * (weight / e.weight as f32),
+            };
+            return self.cell.entries.iter().filter(holds).map(share).sum();
+        }
+        let at = self.runs.partition_point(|r| r.first_light <= light);
+        let listed = at
+            .checked_sub(1)
+            .is_some_and(|i| light < self.runs[i].first_light + self.runs[i].count);
+        if !listed || self.row.weight == 0 {
+            return 0.0;
+        }
+        weight / self.row.weight as f32
+    }
 }
 
 /// Estimated irradiance/π that the node's lights give per strength: cosines at both ends at their best, over a squared

@@ -9,7 +9,7 @@ use super::trace::Tracer;
 use crate::render::film::{Aovs, Film};
 use crate::render::settings::{AmbientLight, Secondary, Settings};
 use crate::scene::Scene;
-use crate::scene::camera::Camera;
+use crate::scene::camera::{Camera, Shot};
 use crate::scene::records::NONE;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -116,6 +116,7 @@ impl<'a> CpuRenderer<'a> {
             }
         }
         out.transparent += self.highlight(tracer, settings, &seen, address, counts);
+        let settings = &settings.of_branches();
         while let Some(path) = branches.paths.pop() {
             let seen = see(scene, tracer, settings, &path, cone, &mut branches);
             out.transparent += seen.layers + seen.share * seen.emission;
@@ -149,6 +150,37 @@ impl<'a> CpuRenderer<'a> {
     /// Mean of independent samples `range` of every pixel. `progress` is called with the share done, 0..1, from any
     /// thread.
     pub fn accumulate(
+        &self,
+        camera: impl Into<Shot>,
+        size: (u32, u32),
+        settings: &Settings,
+        range: Range<u32>,
+        progress: &(dyn Fn(f32) + Sync),
+    ) -> (Film, RayCounts) {
+        let shot = camera.into();
+        if settings.shutter <= 0.0 || range.is_empty() {
+            return self.still(&shot.open, size, settings, range, progress);
+        }
+        // All pixels take a sample at the same moment: one scene to set up for each.
+        let (first, count) = (range.start, range.len() as f32);
+        let mut film = Film::new(size.0, size.1);
+        let mut counts = RayCounts::default();
+        for index in range {
+            let now = settings.at_sample(index);
+            let camera = shot.at(settings.shutter_share(index));
+            let (one, rays) = self.still(&camera, size, &now, index..index + 1, &|_| {});
+            // Both are of the same size: it is this function that made them.
+            if film.merge(&one).is_err() {
+                film = one;
+            }
+            counts += rays;
+            progress((index - first + 1) as f32 / count);
+        }
+        (film, counts)
+    }
+
+    /// The same with a camera and a scene that stand still.
+    fn still(
         &self,
         camera: &Camera,
         size: (u32, u32),

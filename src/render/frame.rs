@@ -190,7 +190,7 @@ impl FrameRenderer {
         self.primary.record(&mut r, &view.focus[slot], listed)?;
         if let Some(pixels) = listed {
             self.secondary
-                .record(&mut r, pixels, &view.counters[slot], &view.focus[slot])?;
+                .record(&mut r, pixels, &view.counters[slot], &view.focus[slot], &view.exposure)?;
         }
         let denoises = input.denoises();
         if denoises && constants.changed != 0 {

@@ -7,7 +7,7 @@ use super::settings::{Secondary, Settings};
 use super::view_state::ViewState;
 use crate::gpu::{GpuError, Image};
 use crate::reference::direct::RayCounts;
-use crate::scene::camera::Camera;
+use crate::scene::camera::{Camera, Shot};
 use crate::scene::records::NONE;
 use std::ops::Range;
 
@@ -102,16 +102,18 @@ impl<'a> GpuRenderer<'a> {
     /// [`RenderError`] of the device.
     pub fn accumulate(
         &self,
-        camera: &Camera,
+        camera: impl Into<Shot>,
         size: (u32, u32),
         settings: &Settings,
         range: Range<u32>,
         progress: &(dyn Fn(f32) + Sync),
     ) -> Result<(Film, RayCounts), RenderError> {
+        let camera = camera.into();
         let mut view = self.view(size)?;
         let count = range.len() as u32;
         for (n, index) in range.enumerate() {
-            self.accumulate_one(&mut view, camera, settings, index, n as u32 + 1)?;
+            let now = camera.at(settings.shutter_share(index));
+            self.accumulate_one(&mut view, &now, &settings.at_sample(index), index, n as u32 + 1)?;
             progress((n + 1) as f32 / count as f32);
         }
         let mut counts = view.take_counts(0)?;

@@ -1,7 +1,7 @@
 //! Settings of a frame, independent of where they come from.
 
 use crate::scene::clock::Clock;
-use crate::scene::sampling::Sequence;
+use crate::scene::sampling::{DIM_SHUTTER, Sequence, key, sample2};
 
 /// Curve from exposed radiance to the display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,8 +121,10 @@ pub struct Settings {
     pub glossy: bool,
     /// Shade lit layers, one of them and what is behind at random; else only what is behind.
     pub choose_layers: bool,
-    /// The scene's time.
+    /// The scene's time; where the shutter is open longer, when it opens.
     pub clock: Clock,
+    /// How long the shutter is open for samples that are averaged, seconds.
+    pub shutter: f32,
 }
 
 impl Settings {
@@ -132,6 +134,34 @@ impl Settings {
             self.secondary
         } else {
             Secondary::Off
+        }
+    }
+
+    /// The same for light that branches off, which nothing denoises: more candidates for each light sample.
+    pub fn of_branches(&self) -> Self {
+        Self {
+            candidates: self.candidates * BRANCH_CANDIDATES,
+            ..*self
+        }
+    }
+
+    /// Share 0..1 of the time that the shutter is open at which sample `index` is taken, the same for all pixels; 0 where it
+    /// is not open.
+    pub fn shutter_share(&self, index: u32) -> f32 {
+        if self.shutter > 0.0 {
+            sample2(self.sequence, key(self.seed, 0, DIM_SHUTTER), index)[0]
+        } else {
+            0.0
+        }
+    }
+
+    /// Settings at the moment of sample `index`.
+    pub fn at_sample(&self, index: u32) -> Self {
+        let seconds = f64::from(self.shutter) * f64::from(self.shutter_share(index));
+        Self {
+            clock: self.clock.after(seconds),
+            shutter: 0.0,
+            ..*self
         }
     }
 
@@ -149,6 +179,8 @@ impl Settings {
     }
 }
 
+/// Candidates of light that branches off, as a multiple.
+pub const BRANCH_CANDIDATES: u32 = 4;
 /// Most levels of the denoiser's filter.
 const MOST_LEVELS: u32 = 5;
 /// First of the views of the denoiser's filter levels in [`crate::console::cvars::VIEWS`].
@@ -201,6 +233,7 @@ impl Default for Settings {
             glossy: true,
             choose_layers: true,
             clock: Clock::default(),
+            shutter: 0.0,
         }
     }
 }

@@ -16,6 +16,44 @@ pub struct Camera {
     pub fov: f32,
 }
 
+/// A view while the shutter is open.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shot {
+    /// When it opens.
+    pub open: Camera,
+    /// When it closes.
+    pub close: Camera,
+}
+
+impl From<&Camera> for Shot {
+    /// A camera that stands still.
+    fn from(camera: &Camera) -> Self {
+        Self {
+            open: *camera,
+            close: *camera,
+        }
+    }
+}
+
+impl Shot {
+    /// The view at a share 0..1 of the time between: straight on, and turning evenly.
+    pub fn at(&self, share: f32) -> Camera {
+        if self.open == self.close {
+            return self.open;
+        }
+        let (a, b) = (&self.open, &self.close);
+        let mix = |a: f32, b: f32| a + (b - a) * share;
+        let turn = |a: f32, b: f32| a + ((b - a + 180.0).rem_euclid(360.0) - 180.0) * share;
+        Camera {
+            eye: [0, 1, 2].map(|i| mix(a.eye[i], b.eye[i])),
+            pitch: turn(a.pitch, b.pitch),
+            yaw: turn(a.yaw, b.yaw),
+            roll: turn(a.roll, b.roll),
+            fov: mix(a.fov, b.fov),
+        }
+    }
+}
+
 /// Unit axes of a view in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
@@ -75,6 +113,16 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shots_turn_the_short_way() {
+        let shot = Shot {
+            open: Camera::new(Vec3::ZERO, 350.0, 90.0),
+            close: Camera::new(Vec3::X, 10.0, 90.0),
+        };
+        let middle = shot.at(0.5);
+        assert_eq!((middle.eye[0], middle.yaw.rem_euclid(360.0)), (0.5, 0.0));
+    }
 
     #[test]
     fn axes_follow_the_games_conventions() {

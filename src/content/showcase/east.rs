@@ -1,6 +1,7 @@
 //! Sun hall and big hall.
 
 use super::fittings::{Archway, arch_under, ceiling_light, grate, knot, pillar, skirting, wall_lamp};
+use super::glass::mirror_and_tubes;
 use super::palette::{Palette, room};
 use crate::assets::bsp::build::{Bounds, CellId, Face, MapBuilder};
 use glam::Vec3;
@@ -112,6 +113,7 @@ pub fn big_hall(map: &mut MapBuilder, p: &Palette, gallery: CellId, sun_hall: Ce
     map.pillar(Bounds::new([1028, 708, 36], [1084, 764, 84]), p.marble);
     knot(map, Vec3::new(1056.0, 736.0, 142.0), 62.0, 14.0, p.marble.shader);
     crates(map, p);
+    mirror_and_tubes(map, p, 1472, 736);
     wall_lamp(map, p, [1472, 640, 144], Face::MinX, [24, 48], p.colored[2]);
     wall_lamp(map, p, [1472, 832, 144], Face::MinX, [24, 48], p.colored[1]);
     hall

@@ -1,5 +1,5 @@
 //! The map that ships: an atrium under an oculus, a sun-lit hall, a gallery of coloured lamps, a long corridor, stairs
-//! down to a dark cellar, a forge above it, and a big hall under one large light.
+//! down to a dark cellar, a forge above it, and a big hall under one large light with a mirror between glass tubes.
 //!
 //! ```text
 //!                 gallery ───────────── big hall
@@ -15,6 +15,7 @@ mod atrium;
 mod below;
 mod east;
 mod fittings;
+mod glass;
 mod palette;
 mod script;
 mod west;
@@ -69,7 +70,7 @@ pub fn map() -> MapBuilder {
 
 /// Deathmatch spawns, each with a view worth a picture; the first is the README's.
 fn spawns(map: &mut MapBuilder) {
-    const SPAWNS: [([i32; 3], i32); 9] = [
+    const SPAWNS: [([i32; 3], i32); 10] = [
         ([200, -96, 25], 117),    // atrium: sunlight through the arches, the gallery's colours behind
         ([1180, 36, 25], 207),    // sun hall: the windows and their light on the floor
         ([-540, 500, 25], 12),    // gallery: the row of coloured lamps
@@ -79,6 +80,7 @@ fn spawns(map: &mut MapBuilder) {
         ([280, -480, 25], 215),   // forge: the coals
         ([690, 950, 25], 329),    // big hall: the statue under the large light
         ([-216, -140, 25], 46),   // atrium again: columns and statue
+        ([1256, 756, 25], 355),   // big hall: the mirror between glass tubes
     ];
     for (origin, angle) in SPAWNS {
         map.entity(Entity::spawn(origin, angle));

@@ -51,7 +51,13 @@ pub fn text() -> String {
     );
     text.push_str(
         "textures/showcase/grate\n{\n\tsurfaceparm trans\n\tsurfaceparm alphashadow\n\tsurfaceparm nomarks\n\tcull none\n\
-         \t{\n\t\tmap textures/showcase/grate.png\n\t\talphaFunc GE128\n\t\tdepthWrite\n\t\trgbGen identity\n\t}\n}\n",
+         \t{\n\t\tmap textures/showcase/grate.png\n\t\talphaFunc GE128\n\t\tdepthWrite\n\t\trgbGen identity\n\t}\n}\n\n",
+    );
+    text.push_str(
+        "textures/showcase/glass\n{\n\tsurfaceparm trans\n\tsurfaceparm nolightmap\n\tsurfaceparm nomarks\n\tcull none\n\
+         \trt_ior 1.5\n\t{\n\t\tmap $whiteimage\n\t\tblendFunc filter\n\t\trgbGen const ( 0.95 0.985 0.97 )\n\t}\n}\n\n\
+         textures/showcase/mirror\n{\n\tsurfaceparm nolightmap\n\tsurfaceparm nomarks\n\tportal\n\
+         \t{\n\t\tmap $whiteimage\n\t\tblendFunc filter\n\t\trgbGen const ( 0.97 0.97 0.97 )\n\t\tdepthWrite\n\t}\n}\n",
     );
     text
 }
