@@ -189,7 +189,8 @@ fn records() -> Vec<Record> {
             first_triangle,
             mesh,
             identity,
-            moves
+            moves,
+            seen_by
         }),
         record!(Light {
             kind,

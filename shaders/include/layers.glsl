@@ -51,6 +51,7 @@ Seen see(Path path) {
     float travelled = path.travelled;
     uint depth = path.depth;
     float pdf = path.pdf;
+    uint kind = depth > 0 ? SEEN_BY_REFLECTIONS : SEEN_BY_EYE;
     bool pending = false;
     SurfaceHit lit;
     Hit lit_hit;
@@ -66,8 +67,10 @@ Seen see(Path path) {
     uint branch = 0;
     [[dont_unroll]] for (uint i = 0; i < MOST_LAYERS; i++) {
         meets_layers = true;
+        ray_kind = kind;
         Hit hit = trace(origin, direction, RAY_FAR, false);
         meets_layers = false;
+        ray_kind = SEEN_BY_SHADOWS;
         if (hit.triangle == NONE || max(out_.share.x, max(out_.share.y, out_.share.z)) <= LEAST_SHARE) {
             if (pending) {
                 out_.surface = lit;
@@ -164,6 +167,7 @@ Seen see(Path path) {
             out_.share *= s.specular * fog.a;
             // As far as motion goes, the surface reflects like a plane.
             reflect_at(s.position, s.shading_normal, out_.place);
+            kind = SEEN_BY_REFLECTIONS;
             mirrored(s, direction, origin, onward);
         } else {
             out_.layers += out_.share * emission * fog.a;
@@ -172,6 +176,7 @@ Seen see(Path path) {
                 depth++;
                 if (depth > FC.max_depth) return out_;
                 onward = direction;
+                kind = SEEN_BY_REFLECTIONS;
                 go_through(FC.triangles.at[hit.triangle].surface, s, origin, onward, out_.place);
             } else {
                 if (s.albedo != vec3(0.0)) {

@@ -166,6 +166,10 @@ struct Stage {
     uint mod_count;
 };
 
+const uint SEEN_BY_EYE = 1;
+const uint SEEN_BY_REFLECTIONS = 2;
+const uint SEEN_BY_SHADOWS = 4;
+
 struct Instance {
     vec4 object_to_world[3];
     vec4 world_to_object[3];
@@ -174,6 +178,7 @@ struct Instance {
     uint mesh;
     uint identity;
     uint moves;
+    uint seen_by;
 };
 
 const uint LIGHT_TRIANGLE = 0;

@@ -18,6 +18,8 @@ struct Hit {
 
 const float RAY_FAR = 3.402823466e38;
 
+// Which instances the ray being traced meets: SEEN_BY_….
+uint ray_kind = SEEN_BY_SHADOWS;
 // Whether the ray being traced meets layers, too: hits after `after_t`, among coincident triangles after `after_triangle`.
 bool meets_layers = false;
 float after_t;

@@ -96,7 +96,7 @@ Hit trace(vec3 origin, vec3 direction, float t_max, bool any) {
             d = vec3(dot(i.world_to_object[0].xyz, direction), dot(i.world_to_object[1].xyz, direction),
                      dot(i.world_to_object[2].xyz, direction));
         }
-        if (trace_mesh(FC.mesh_trees.at[i.mesh], o, d, any, hit)) {
+        if ((i.seen_by & ray_kind) != 0 && trace_mesh(FC.mesh_trees.at[i.mesh], o, d, any, hit)) {
             hit.instance = instance;
             if (any) return hit;
         }

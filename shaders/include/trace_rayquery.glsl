@@ -21,7 +21,7 @@ Hit trace(vec3 origin, vec3 direction, float t_max, bool any) {
     // Opaque hits are taken without asking: what lies at the distance of an opaque hit before is left out with it.
     if (meets_layers) t_min = after_opaque ? after_t * 1.0000004 : after_t;
 #endif
-    rayQueryInitializeEXT(query, top_level, flags, 0xff, origin, t_min, direction, t_max);
+    rayQueryInitializeEXT(query, top_level, flags, ray_kind, origin, t_min, direction, t_max);
     while (rayQueryProceedEXT(query)) {
         if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionTriangleEXT) continue;
         uint triangle = global_triangle(uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false)),

@@ -1,7 +1,7 @@
 //! Options that every sub-command takes, and what follows from them.
 
 use super::args::CliError;
-use crate::assets::vfs::{Install, Vfs};
+use crate::assets::vfs::{FileSource, Install, Vfs};
 use crate::console::Cvars;
 use crate::console::settings::lights;
 use crate::content;
@@ -10,6 +10,8 @@ use crate::gpu::ValidationMode;
 use crate::lighting::{self, Lighting};
 use crate::recovery::Options;
 use crate::scene::Scene;
+use crate::scene::load::LoadOptions;
+use crate::scene::player::Player;
 use directories::ProjectDirs;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
@@ -32,6 +34,9 @@ pub struct Common {
     /// Seed of all random numbers (the same as +set rt_seed)
     #[arg(long, global = true, value_name = "N", allow_hyphen_values = true)]
     pub seed: Option<String>,
+    /// Body that mirrors show, and with it a weapon before the eye; in `play`, sarge where there is one
+    #[arg(long, global = true, value_name = "MODEL[/SKIN]")]
+    pub player: Option<String>,
 }
 
 impl Common {
@@ -79,15 +84,39 @@ impl Common {
         Ok(scene)
     }
 
-    /// Loads a map with the lights that the variables ask for.
+    /// Loads a map with the lights that the variables ask for, and the player that the options name.
     pub fn lit_scene(&self, map: &str, cvars: &Cvars) -> Result<(Scene, Lighting), CliError> {
         let files = self.files()?.focused_on(map);
-        let mut scene = Scene::load(&files, map).map_err(CliError::failed)?;
+        self.lit_scene_with(&files, map, cvars, self.player.as_deref().map(player))
+    }
+
+    /// The same for somebody who plays: the default player where none is named and its files are there.
+    pub fn played_scene(&self, map: &str, cvars: &Cvars) -> Result<(Scene, Lighting), CliError> {
+        let files = self.files()?.focused_on(map);
+        let there = |p: &Player| {
+            let path = format!("models/players/{}/lower.md3", p.model);
+            matches!(files.read(&path), Ok(Some(_)))
+        };
+        let player = match &self.player {
+            Some(name) => Some(player(name)),
+            None => Some(Player::default()).filter(there),
+        };
+        self.lit_scene_with(&files, map, cvars, player)
+    }
+
+    fn lit_scene_with(
+        &self,
+        files: &Vfs,
+        map: &str,
+        cvars: &Cvars,
+        player: Option<Player>,
+    ) -> Result<(Scene, Lighting), CliError> {
+        let mut scene = Scene::load_with(files, map, &LoadOptions { player }).map_err(CliError::failed)?;
         report_warnings(&scene);
         let bar = progress(RECOVERY_STEPS, &format!("{map}: lights"));
         let lit = lighting::light(
             &mut scene,
-            &files,
+            files,
             lights(cvars),
             &lights_folder(),
             &Options::default(),
@@ -99,6 +128,16 @@ impl Common {
             eprintln!("warning: {warning}");
         }
         Ok((scene, lit))
+    }
+}
+
+/// The player of a MODEL[/SKIN].
+fn player(name: &str) -> Player {
+    let (model, skin) = name.split_once('/').unwrap_or((name, "default"));
+    Player {
+        model: model.to_ascii_lowercase(),
+        skin: skin.to_ascii_lowercase(),
+        ..Player::default()
     }
 }
 

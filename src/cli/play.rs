@@ -27,7 +27,7 @@ pub struct Args {
 /// Opens the window on a map, or does a run without one where there is no display.
 pub fn run(common: &Common, cvars: Cvars, args: Args, map: Option<String>) -> CliResult {
     let map = args.map.or(map).unwrap_or_else(|| DEFAULT_MAP.to_owned());
-    let (scene, _) = common.lit_scene(&map, &cvars)?;
+    let (scene, _) = common.played_scene(&map, &cvars)?;
     let engine = common.engine(&cvars)?;
     match engine {
         Engine::Vulkan { .. } if window::has_display() => {

@@ -279,6 +279,13 @@ pub const CVARS: &[Cvar] = &[
     ),
     int("rt_seed", 0, 0, 0xffff_ffff, "seed of all random numbers"),
     int("rt_printPerfStats", 0, 0, 1, "prints times per pass every second"),
+    int(
+        "cg_drawGun",
+        1,
+        0,
+        1,
+        "shows the weapon before the eye, where there is a player",
+    ),
     float("cg_fov", 90.0, 1.0, 179.0, "horizontal field of view, degrees"),
     float("sensitivity", 5.0, 0.01, 100.0, "mouse sensitivity"),
     int(

@@ -85,6 +85,7 @@ pub fn settings(cvars: &Cvars) -> Settings {
         },
         glossy: on("rt_glossy"),
         choose_layers: true,
+        draw_gun: on("cg_drawGun"),
         clock: Clock::default(),
         shutter: number("rt_motionblur") as f32 / FRAME_RATE,
     }

@@ -16,11 +16,10 @@ use super::visibility::ON_RECEIVER;
 use crate::render::settings::{Secondary, Settings};
 use crate::scene::Scene;
 use crate::scene::light_power::luminance;
-use crate::scene::records::{MATERIAL_LAYER, MATERIAL_PORTAL};
+use crate::scene::records::{MATERIAL_LAYER, MATERIAL_PORTAL, SEEN_BY_EYE, SEEN_BY_REFLECTIONS};
 use crate::scene::sampling::{DIM_LAYER, bits2, key, unit};
 use glam::Vec3;
 
-const FAR: f64 = f32::MAX as f64;
 /// Surfaces that a ray goes through at most; what is behind is too faint to matter long before.
 pub const MOST_LAYERS: u32 = 1024;
 /// A ray of which less than this share goes on ends.
@@ -105,6 +104,7 @@ pub fn see(
     let mut travelled = path.travelled;
     let mut depth = path.depth;
     let mut lobe = path.lobe;
+    let mut kind = if depth > 0 { SEEN_BY_REFLECTIONS } else { SEEN_BY_EYE };
     let mut pending: Option<Pending> = None;
     let mut after = None;
     let mut dimension = DIM_LAYER;
@@ -112,7 +112,7 @@ pub fn see(
     // Fog on the way to the last surface, and what it leaves.
     let mut fog = (Vec3::ZERO, 1.0);
     for _ in 0..MOST_LAYERS {
-        let hit = tracer.next(scene, ray.origin, ray.direction, FAR, after);
+        let hit = tracer.look(scene, ray.origin, ray.direction, after, kind);
         let Some(hit) = hit.filter(|_| out.share.max_element() > LEAST_SHARE) else {
             // Nothing behind: the layer takes all.
             if let Some(p) = pending {
@@ -208,6 +208,7 @@ pub fn see(
             if goes_back {
                 out.share *= surface.specular * fog.1;
                 ray = mirrored(&surface, ray.direction);
+                kind = SEEN_BY_REFLECTIONS;
                 travelled = distance;
                 (lobe, after, fog) = (None, None, (Vec3::ZERO, 1.0));
                 continue;
@@ -229,6 +230,7 @@ pub fn see(
             }
             let number = scene.geometry.triangles[hit.triangle as usize].surface;
             ray = go_through(scene, number, &surface, ray.direction);
+            kind = SEEN_BY_REFLECTIONS;
             travelled = distance;
             (lobe, after, fog) = (None, None, (Vec3::ZERO, 1.0));
             continue;

@@ -190,7 +190,7 @@ impl<'a> CpuRenderer<'a> {
     ) -> (Film, RayCounts) {
         let (width, height) = size;
         let view = self.view(camera, size, settings);
-        let tracer = self.tracer.at(self.scene, settings, camera.eye.into());
+        let tracer = self.tracer.at(self.scene, settings, camera);
         let cone = if settings.filter_textures {
             view.pixel_width
         } else {
@@ -240,7 +240,7 @@ impl<'a> CpuRenderer<'a> {
     /// Geometry through pixel centres.
     pub fn aovs(&self, camera: &Camera, size: (u32, u32), settings: &Settings) -> Aovs {
         let view = View::new(camera, size, 1.0);
-        let tracer = self.tracer.at(self.scene, settings, camera.eye.into());
+        let tracer = self.tracer.at(self.scene, settings, camera);
         let settings = &Settings {
             choose_layers: false,
             secondary: Secondary::Off,

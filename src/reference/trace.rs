@@ -5,11 +5,13 @@ use super::surface::point_at;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::bvh::build_cwbvhs;
+use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
 use crate::scene::dynamic_geometry::{self, Moved};
 use crate::scene::entity_geometry::Placement;
+use crate::scene::motion::Moment;
 use crate::scene::records::{
-    Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material, NONE,
+    Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material, NONE, SEEN_BY_SHADOWS,
 };
 use glam::{DVec3, Vec3};
 use obvhs::cwbvh::CwBvh;
@@ -56,15 +58,25 @@ enum Wanted<'a> {
     /// Any that is no layer.
     Blocker(&'a Cell<bool>),
     /// The nearest of all, layers too, that comes after a hit.
-    Next(Option<Hit>),
+    Next(Option<Hit>, u32),
+}
+
+impl Wanted<'_> {
+    /// Which instances the ray meets: `SEEN_BY_…`.
+    fn kind(&self) -> u32 {
+        match self {
+            Self::Solid(_) | Self::Blocker(_) => SEEN_BY_SHADOWS,
+            Self::Next(_, kind) => *kind,
+        }
+    }
 }
 
 fn moved(scene: &Scene, clock: Clock, eye: Vec3) -> Vec<Moved> {
     dynamic_geometry::all(&scene.geometry, &scene.materials, &scene.tables.deforms, clock, eye)
 }
 
-fn instances(scene: &Scene, clock: Clock) -> Vec<Instance> {
-    let record = |p: &Placement| p.record(&scene.geometry.meshes, clock, clock);
+fn instances(scene: &Scene, moment: &Moment) -> Vec<Instance> {
+    let record = |p: &Placement| p.record(&scene.geometry.meshes, moment, moment);
     scene.placements.iter().map(record).collect()
 }
 
@@ -117,7 +129,7 @@ impl Tracer {
     pub fn new(scene: &Scene) -> Self {
         Self {
             trees: Arc::new(build_cwbvhs(&scene.geometry)),
-            instances: instances(scene, Clock::default()),
+            instances: instances(scene, &Clock::default().into()),
             clock: Clock::default(),
             glossy: false,
             lights: Arc::new(scene.lights.of_triangles(scene.geometry.triangles.len())),
@@ -125,12 +137,13 @@ impl Tracer {
         }
     }
 
-    /// The same scene at another moment, seen from `eye`.
-    pub fn at(&self, scene: &Scene, settings: &Settings, eye: Vec3) -> Self {
-        let clock = settings.clock;
+    /// The same scene at another moment, seen by `camera`.
+    pub fn at(&self, scene: &Scene, settings: &Settings, camera: &Camera) -> Self {
+        let (clock, eye) = (settings.clock, camera.eye.into());
+        let moment = settings.moment(camera);
         Self {
             trees: self.trees.clone(),
-            instances: instances(scene, clock),
+            instances: instances(scene, &moment),
             clock,
             glossy: settings.reflects(),
             lights: self.lights.clone(),
@@ -172,7 +185,7 @@ impl Tracer {
         let mut limit = t_max;
         for (index, instance) in self.instances.iter().enumerate() {
             let mesh = &scene.geometry.meshes[instance.mesh as usize];
-            if mesh.triangle_count == 0 {
+            if mesh.triangle_count == 0 || instance.seen_by & wanted.kind() == 0 {
                 continue;
             }
             let (o, d) = if instance.identity == 1 {
@@ -224,12 +237,12 @@ impl Tracer {
         let material = &scene.materials[scene.geometry.triangles[hit.triangle as usize].material as usize];
         if material.flags & (MATERIAL_ALPHA_TESTED | MATERIAL_LAYER) == 0 {
             return match wanted {
-                Wanted::Next(Some(after)) => after.before(hit.t, hit.triangle),
+                Wanted::Next(Some(after), _) => after.before(hit.t, hit.triangle),
                 _ => true,
             };
         }
         match wanted {
-            Wanted::Next(after) => {
+            Wanted::Next(after, _) => {
                 after.is_none_or(|a| a.before(hit.t, hit.triangle)) && self.passes(scene, material, hit, direction)
             }
             Wanted::Solid(filtered) | Wanted::Blocker(filtered) => {
@@ -256,9 +269,20 @@ impl Tracer {
         self.visit(scene, origin, direction, t_max, &Wanted::Solid(&Cell::new(false)))
     }
 
-    /// The nearest hit after another one, layers included.
+    /// The nearest hit of a shadow ray after another one, layers included.
     pub fn next(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64, after: Option<Hit>) -> Option<Hit> {
-        self.visit(scene, origin, direction, t_max, &Wanted::Next(after))
+        self.visit(scene, origin, direction, t_max, &Wanted::Next(after, SEEN_BY_SHADOWS))
+    }
+
+    /// The nearest hit of a ray that looks after another one, layers included. `kind`: one of `SEEN_BY_…`.
+    pub fn look(&self, scene: &Scene, origin: Vec3, direction: Vec3, after: Option<Hit>, kind: u32) -> Option<Hit> {
+        self.visit(
+            scene,
+            origin,
+            direction,
+            f64::from(f32::MAX),
+            &Wanted::Next(after, kind),
+        )
     }
 
     /// What lies at 0 < t < `t_max`.

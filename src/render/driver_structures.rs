@@ -55,6 +55,7 @@ fn placed(bottom: &[Option<BottomLevel>], instances: &[Instance]) -> Vec<TopInst
             let level = bottom[instance.mesh as usize].as_ref()?;
             Some(TopInstance {
                 transform: instance.object_to_world,
+                mask: instance.seen_by as u8,
                 ..TopInstance::new(level, index as u32)
             })
         })

@@ -137,8 +137,8 @@ impl FrameRenderer {
                 None => Moving::new(scene, view.constants.len())?,
             };
             let moving = view.moving.insert(moving);
-            let clock = input.settings.clock;
-            constants = moving.advance(scene, slot, clock, constants)?;
+            let now = input.settings.moment(&input.camera);
+            constants = moving.advance(scene, slot, now, constants)?;
         }
         let reuses = input.reuses();
         if reuses {

@@ -6,7 +6,7 @@ use super::frame_constants::FrameConstants;
 use super::scene_gpu::SceneGpu;
 use crate::gpu::acceleration::{TopInstance, TopLevel};
 use crate::gpu::{Access, Buffer, Commands, DescriptorSets, GpuError, MemoryKind, Tracker, Use, Write};
-use crate::scene::clock::Clock;
+use crate::scene::motion::Moment;
 use crate::scene::records::Instance;
 use ash::vk;
 
@@ -18,7 +18,7 @@ pub struct Moving {
     top: Option<(TopLevel, DescriptorSets)>,
     /// What the frame's top level is made of.
     placed: Vec<TopInstance>,
-    before: Option<Clock>,
+    before: Option<Moment>,
 }
 
 impl Moving {
@@ -62,14 +62,14 @@ impl Moving {
         &mut self,
         scene: &SceneGpu,
         slot: usize,
-        clock: Clock,
+        now: Moment,
         constants: FrameConstants,
     ) -> Result<FrameConstants, GpuError> {
-        let before = self.before.replace(clock).unwrap_or(clock);
+        let before = self.before.replace(now).unwrap_or(now);
         let records: Vec<Instance> = scene
             .placements
             .iter()
-            .map(|p| p.record(&scene.meshes, clock, before))
+            .map(|p| p.record(&scene.meshes, &now, &before))
             .collect();
         let tree =
             instance_tree(&scene.meshes, &records, &scene.name).map_err(|e| GpuError::InvalidInput(e.to_string()))?;
@@ -91,7 +91,7 @@ impl Moving {
             instance_nodes: self.nodes[slot].address(),
             instance_count: count,
             instance_root: tree.root,
-            moving: u32::from(before != clock),
+            moving: u32::from(before.clock != now.clock || (scene.has_player && before.camera != now.camera)),
             ..constants
         })
     }

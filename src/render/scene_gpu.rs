@@ -15,6 +15,7 @@ use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
 use crate::scene::entity_geometry::Placement;
+use crate::scene::motion::Motion;
 use crate::scene::records::{
     Instance, Light, MATERIAL_DIELECTRIC, MATERIAL_FILTER, MATERIAL_GLOSSY, NONE, TextureInfo,
 };
@@ -90,6 +91,8 @@ pub struct SceneGpu {
     /// Light of each triangle, or [`NONE`].
     pub triangle_lights: Buffer,
     pub moving: Moving,
+    /// Somebody looks at the scene: parts of it follow the camera.
+    pub has_player: bool,
     pub name: String,
     /// Where meshes stand, and how they move.
     pub placements: Vec<Placement>,
@@ -151,11 +154,11 @@ impl SceneGpu {
         backend: Backend,
         quality: BvhQuality,
     ) -> Result<Self, RenderError> {
-        let start = Clock::default();
+        let start = Clock::default().into();
         let instances: Vec<Instance> = scene
             .placements
             .iter()
-            .map(|p| p.record(&scene.geometry.meshes, start, start))
+            .map(|p| p.record(&scene.geometry.meshes, &start, &start))
             .collect();
         let trees = MeshTrees::build(scene, quality)?;
         let others = instance_tree(&scene.geometry.meshes, &instances, &scene.name)?;
@@ -312,6 +315,10 @@ impl SceneGpu {
                 lights: scene.material_sources.iter().any(|m| m.program.moving_emission),
                 geometry: scene.placements.iter().any(|p| p.motion.moves()) || !trees.dynamic.is_empty(),
             },
+            has_player: scene
+                .placements
+                .iter()
+                .any(|p| matches!(p.motion, Motion::Body(_) | Motion::View(_))),
             name: scene.name.clone(),
             placements: scene.placements.clone(),
             meshes: scene.geometry.meshes.clone(),

@@ -1,6 +1,8 @@
 //! Settings of a frame, independent of where they come from.
 
+use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
+use crate::scene::motion::Moment;
 use crate::scene::sampling::{DIM_SHUTTER, Sequence, key, sample2};
 
 /// Curve from exposed radiance to the display.
@@ -121,6 +123,8 @@ pub struct Settings {
     pub glossy: bool,
     /// Shade lit layers, one of them and what is behind at random; else only what is behind.
     pub choose_layers: bool,
+    /// Draw the weapon before the eye, where the scene has a player.
+    pub draw_gun: bool,
     /// The scene's time; where the shutter is open longer, when it opens.
     pub clock: Clock,
     /// How long the shutter is open for samples that are averaged, seconds.
@@ -152,6 +156,15 @@ impl Settings {
             sample2(self.sequence, key(self.seed, 0, DIM_SHUTTER), index)[0]
         } else {
             0.0
+        }
+    }
+
+    /// What poses depend on.
+    pub fn moment(&self, camera: &Camera) -> Moment {
+        Moment {
+            clock: self.clock,
+            camera: *camera,
+            draw_gun: self.draw_gun,
         }
     }
 
@@ -232,6 +245,7 @@ impl Default for Settings {
             secondary: Secondary::Both,
             glossy: true,
             choose_layers: true,
+            draw_gun: true,
             clock: Clock::default(),
             shutter: 0.0,
         }

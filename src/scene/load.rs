@@ -11,6 +11,7 @@ use super::lights::{LightInputs, LightTable};
 use super::material::{MaterialSource, Tables};
 use super::models::Models;
 use super::motion::Motion;
+use super::player::{self, Player, Shelf};
 use super::portals;
 use super::records::{BspNode, Material, Portal};
 use super::spawns::{Spawn, spawns};
@@ -35,6 +36,13 @@ pub enum SceneError {
     Bsp { name: String, source: BspError },
     #[error(transparent)]
     Files(#[from] VfsError),
+}
+
+/// What is loaded with a map.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// Somebody who looks at it: a body for mirrors and a weapon before the eye.
+    pub player: Option<Player>,
 }
 
 /// A loaded map, ready for the tracers. World units, z up; radiance in luxel units.
@@ -98,6 +106,14 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] where there is no such map or it is damaged. Missing images and scripts are warnings.
     pub fn load(files: &dyn FileSource, name: &str) -> Result<Self, SceneError> {
+        Self::load_with(files, name, &LoadOptions::default())
+    }
+
+    /// The same with what else is to be there.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with(files: &dyn FileSource, name: &str, options: &LoadOptions) -> Result<Self, SceneError> {
         let start = Instant::now();
         let bytes = files
             .read(&map_path(name))?
@@ -107,7 +123,7 @@ impl Scene {
             source,
         })?;
         drop(bytes);
-        Self::from_bsp_timed(files, name, bsp, start)
+        Self::from_bsp_timed(files, name, bsp, options, start)
     }
 
     /// Builds a scene of a map that is already in memory.
@@ -115,10 +131,16 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Files`] where scripts exist and cannot be read.
     pub fn from_bsp(files: &dyn FileSource, name: &str, bsp: Bsp) -> Result<Self, SceneError> {
-        Self::from_bsp_timed(files, name, bsp, Instant::now())
+        Self::from_bsp_timed(files, name, bsp, &LoadOptions::default(), Instant::now())
     }
 
-    fn from_bsp_timed(files: &dyn FileSource, name: &str, bsp: Bsp, start: Instant) -> Result<Self, SceneError> {
+    fn from_bsp_timed(
+        files: &dyn FileSource,
+        name: &str,
+        bsp: Bsp,
+        options: &LoadOptions,
+        start: Instant,
+    ) -> Result<Self, SceneError> {
         let mut watch = Stopwatch {
             last: start,
             timings: Vec::new(),
@@ -152,6 +174,20 @@ impl Scene {
                 .any(|i| w.ends_with(i.item.models[1]) && !i.item.models[1].is_empty())
         };
         warnings.extend(models.warnings.drain(..).filter(extra));
+        let player = match &options.player {
+            Some(player) => player::parts(
+                player,
+                &mut Shelf {
+                    files,
+                    scripts: &scripts,
+                    models: &mut models,
+                    materials: &mut material_sources,
+                    requests: &mut requests,
+                },
+            )?,
+            None => Vec::new(),
+        };
+        warnings.append(&mut models.warnings);
         watch.lap("models");
         let (textures, missing) = requests.load(files);
         warnings.extend(missing);
@@ -173,10 +209,8 @@ impl Scene {
         }
         let mut placements = entity_geometry::placements(&bsp, &entities);
         if !geometry.dynamic.rest.is_empty() {
-            placements.push(Placement {
-                mesh: geometry.dynamic.mesh,
-                motion: Motion::Still(Affine3A::IDENTITY),
-            });
+            let motion = Motion::Still(Affine3A::IDENTITY);
+            placements.push(Placement::new(geometry.dynamic.mesh, motion));
         }
         let first_model = bsp.models.len() as u32;
         for (item, numbers) in items.iter().zip(item_models) {
@@ -184,6 +218,7 @@ impl Scene {
             let meshes = numbers.map(|n| n.map(|n| n + first_model));
             placements.extend(entity_geometry::item_placements(item, meshes, middles));
         }
+        placements.extend(player.into_iter().map(|part| Placement::of_player(part, first_model)));
         watch.lap("geometry");
         let worldspawn = entities.iter().find(|e| e.class() == "worldspawn");
         let far_plane = worldspawn

@@ -21,6 +21,7 @@ pub mod material;
 pub mod models;
 pub mod motion;
 pub mod optics;
+pub mod player;
 pub mod portals;
 pub mod program;
 pub mod records;

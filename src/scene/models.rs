@@ -5,16 +5,48 @@ use super::records::{NONE, Triangle, VertexAttributes};
 use super::static_geometry::{Geometry, GeometryClass, Mesh};
 use super::textures::TextureRequests;
 use crate::assets::bsp::Bounds;
-use crate::assets::md3::Md3;
+use crate::assets::md3::{Md3, Md3Surface, Md3Vertex};
 use crate::assets::shader_script::ShaderLibrary;
 use crate::assets::vfs::{FileSource, VfsError};
-use glam::Vec3;
+use glam::{Affine3A, Quat, Vec3};
 use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Steps that an animation takes from one frame of the file to the next: between the frames of the file, vertices and tags lie on the line
+/// from one to the other.
+const STEPS_A_FRAME: u32 = 3;
+
+/// A model in one step of an animation.
+struct Model {
+    md3: Arc<Md3>,
+    /// Material of each surface.
+    materials: Vec<u32>,
+    /// Frames that it lies between, and the share of the second.
+    frames: [u32; 2],
+    share: f32,
+}
+
+/// Materials of a model's surfaces by name, in place of its own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Skin(HashMap<String, String>);
+
+impl Skin {
+    /// Reads a `.skin` file: lines of surface, comma, material.
+    pub fn parse(text: &str) -> Self {
+        let pair = |line: &str| {
+            let (surface, material) = line.split_once(',')?;
+            let material = material.trim();
+            (!material.is_empty()).then(|| (surface.trim().to_ascii_lowercase(), material.to_ascii_lowercase()))
+        };
+        Self(text.lines().filter_map(pair).collect())
+    }
+}
 
 /// Models by path, each read once, with the materials that they need.
 #[derive(Default)]
 pub struct Models {
-    models: Vec<(Md3, Vec<u32>)>,
+    models: Vec<Model>,
     by_path: HashMap<String, Option<u32>>,
     /// What is missing or damaged, one sentence each.
     pub warnings: Vec<String>,
@@ -38,7 +70,25 @@ impl Models {
         if let Some(&known) = self.by_path.get(&path) {
             return Ok(known);
         }
-        let found = match files.read(&path)?.map(|bytes| Md3::read(&bytes)) {
+        let found = match self.read(&path, files)? {
+            None => None,
+            Some(md3) => {
+                let materials = surface_materials(&md3, &Skin::default(), scripts, materials, requests);
+                self.models.push(Model {
+                    md3,
+                    materials,
+                    frames: [0, 0],
+                    share: 0.0,
+                });
+                Some(self.models.len() as u32 - 1)
+            }
+        };
+        self.by_path.insert(path, found);
+        Ok(found)
+    }
+
+    fn read(&mut self, path: &str, files: &dyn FileSource) -> Result<Option<Arc<Md3>>, VfsError> {
+        Ok(match files.read(path)?.map(|bytes| Md3::read(&bytes)) {
             None => {
                 self.warnings.push(format!("missing model {path}"));
                 None
@@ -47,25 +97,67 @@ impl Models {
                 self.warnings.push(format!("cannot read {path}: {e}"));
                 None
             }
-            Some(Ok(model)) => {
-                let numbers = model
-                    .surfaces
-                    .iter()
-                    .map(|s| material(&s.shader, scripts, materials, requests))
-                    .collect();
-                self.models.push((model, numbers));
-                Some(self.models.len() as u32 - 1)
-            }
+            Some(Ok(model)) => Some(Arc::new(model)),
+        })
+    }
+
+    /// A model going round some of its frames: number of the first step, and how many there are.
+    ///
+    /// # Errors
+    /// [`VfsError`] where the file exists and cannot be read.
+    #[allow(clippy::too_many_arguments, reason = "where models and materials are found and kept")]
+    pub fn animated(
+        &mut self,
+        path: &str,
+        skin: &Skin,
+        frames: Range<u32>,
+        files: &dyn FileSource,
+        scripts: &ShaderLibrary,
+        materials: &mut Vec<MaterialSource>,
+        requests: &mut TextureRequests,
+    ) -> Result<Option<(u32, u32)>, VfsError> {
+        let Some(md3) = self.read(path, files)? else {
+            return Ok(None);
         };
-        self.by_path.insert(path, found);
-        Ok(found)
+        let materials = surface_materials(&md3, skin, scripts, materials, requests);
+        let most = md3.frame_count.max(1) - 1;
+        let count = frames.len().max(1) as u32;
+        let between = if count > 1 { STEPS_A_FRAME } else { 1 };
+        let first = self.models.len() as u32;
+        for i in 0..count {
+            for s in 0..between {
+                let frame = |i: u32| (frames.start + i % count).min(most);
+                self.models.push(Model {
+                    md3: md3.clone(),
+                    materials: materials.clone(),
+                    frames: [frame(i), frame(i + 1)],
+                    share: s as f32 / between as f32,
+                });
+            }
+        }
+        Ok(Some((first, count * between)))
+    }
+
+    /// Place of a tag on a model.
+    pub fn tag(&self, number: u32, name: &str) -> Option<Affine3A> {
+        let model = &self.models[number as usize];
+        let place = |frame: u32| {
+            let tags = model.md3.tags.get(frame as usize)?;
+            Some(tags.iter().find(|t| t.name == name)?.place)
+        };
+        let [a, b] = [place(model.frames[0])?, place(model.frames[1])?];
+        let turn = Quat::from_mat3a(&a.matrix3).slerp(Quat::from_mat3a(&b.matrix3), model.share);
+        Some(Affine3A::from_rotation_translation(
+            turn,
+            Vec3::from(a.translation).lerp(b.translation.into(), model.share),
+        ))
     }
 
     /// Middle of a model's box in its first frame.
     pub fn middle(&self, number: u32) -> Vec3 {
         let mut bounds = Bounds::EMPTY;
         for v in self.models[number as usize]
-            .0
+            .md3
             .surfaces
             .iter()
             .filter_map(|s| s.frames.first())
@@ -81,9 +173,9 @@ impl Models {
 
     /// Appends every model's first frame as a mesh; mesh `first + i` is model i.
     pub fn append(&self, geometry: &mut Geometry, materials: &[MaterialSource]) {
-        for (model, numbers) in &self.models {
+        for model in &self.models {
             let mut mesh = Mesh {
-                class: if model.frame_count > 1 {
+                class: if model.frames[0] != model.frames[1] {
                     GeometryClass::EntityDynamic
                 } else {
                     GeometryClass::EntityStatic
@@ -94,11 +186,11 @@ impl Models {
                 bounds: Bounds::EMPTY,
             };
             for opaque in [true, false] {
-                for (surface, &material) in model.surfaces.iter().zip(numbers) {
+                for (surface, &material) in model.md3.surfaces.iter().zip(&model.materials) {
                     let visibility = materials[material as usize].visibility;
                     let shown = visibility != Visibility::Invisible;
                     if shown && opaque == matches!(visibility, Visibility::Opaque | Visibility::Sky) {
-                        append_surface(geometry, surface, material, &mut mesh.bounds);
+                        append_surface(geometry, surface, model, material, &mut mesh.bounds);
                     }
                 }
                 let count = geometry.triangles.len() as u32 - mesh.first_triangle;
@@ -110,6 +202,22 @@ impl Models {
             geometry.meshes.push(mesh);
         }
     }
+}
+
+fn surface_materials(
+    md3: &Md3,
+    skin: &Skin,
+    scripts: &ShaderLibrary,
+    materials: &mut Vec<MaterialSource>,
+    requests: &mut TextureRequests,
+) -> Vec<u32> {
+    md3.surfaces
+        .iter()
+        .map(|s| {
+            let name = skin.0.get(&s.name).unwrap_or(&s.shader);
+            material(name, scripts, materials, requests)
+        })
+        .collect()
 }
 
 fn material(
@@ -128,13 +236,16 @@ fn material(
     materials.len() as u32 - 1
 }
 
-fn append_surface(
-    geometry: &mut Geometry,
-    surface: &crate::assets::md3::Md3Surface,
-    material: u32,
-    bounds: &mut Bounds,
-) {
-    let Some(frame) = surface.frames.first() else { return };
+fn append_surface(geometry: &mut Geometry, surface: &Md3Surface, model: &Model, material: u32, bounds: &mut Bounds) {
+    let frame = |i: usize| surface.frames.get(model.frames[i] as usize);
+    let (Some(a), Some(b)) = (frame(0), frame(1)) else {
+        return;
+    };
+    let between = |(a, b): (&Md3Vertex, &Md3Vertex)| Md3Vertex {
+        position: a.position.lerp(b.position, model.share),
+        normal: a.normal.lerp(b.normal, model.share).normalize_or(a.normal),
+    };
+    let frame: Vec<Md3Vertex> = a.iter().zip(b).map(between).collect();
     let base = geometry.positions.len() as u32;
     for (v, uv) in frame.iter().zip(&surface.uvs) {
         bounds.include(v.position);

@@ -1,8 +1,9 @@
 //! How things of a map move by themselves: the pose of each at any moment, from its entity alone.
 
+use super::camera::{Camera, EYE_HEIGHT};
 use super::clock::{Clock, rate};
 use crate::assets::entities::Entity;
-use glam::{Affine3A, Quat, Vec3};
+use glam::{Affine3A, Mat3A, Quat, Vec3};
 use std::f32::consts::TAU;
 
 /// A pose that follows the clock.
@@ -44,6 +45,54 @@ pub enum Motion {
     },
     /// Goes round its corners, with a wait at each.
     Train { legs: Vec<Leg>, seconds: f32 },
+    /// A part of the player who stands under the eye: each joint in the frame of the one before.
+    Body(Vec<Steps>),
+    /// Something held before the eye, likewise.
+    View(Vec<Steps>),
+}
+
+/// A joint that goes round its poses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Steps {
+    pub poses: Vec<Affine3A>,
+    /// Rounds: [`super::clock`].
+    pub rate: u32,
+}
+
+/// What poses depend on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    pub clock: Clock,
+    /// The player's view.
+    pub camera: Camera,
+    /// The weapon before the eye is drawn.
+    pub draw_gun: bool,
+}
+
+impl From<Clock> for Moment {
+    /// A moment of a map without a player.
+    fn from(clock: Clock) -> Self {
+        Self {
+            clock,
+            camera: Camera::new(Vec3::ZERO, 0.0, 90.0),
+            draw_gun: false,
+        }
+    }
+}
+
+/// The weapon is shown so much nearer and smaller than it is, which looks the same, so that it doesn't reach into walls.
+const WEAPON_SCALE: f32 = 0.25;
+
+/// Product of joints.
+fn joined(chain: &[Steps], clock: Clock) -> Affine3A {
+    chain.iter().fold(Affine3A::IDENTITY, |pose, steps| {
+        pose * steps.poses[step(clock, steps.rate, steps.poses.len() as u32) as usize]
+    })
+}
+
+/// Which of `count` steps a round is at.
+pub fn step(clock: Clock, rate: u32, count: u32) -> u32 {
+    ((clock.fraction(rate) * count as f32) as u32).min(count.max(1) - 1)
 }
 
 /// A straight leg of a train's way. Times: seconds after the start of a round.
@@ -182,7 +231,8 @@ impl Motion {
     }
 
     /// Model to world at a moment.
-    pub fn pose(&self, clock: Clock) -> Affine3A {
+    pub fn pose(&self, moment: impl Into<Moment>) -> Affine3A {
+        let Moment { clock, camera, .. } = moment.into();
         let sine = |periods: u32, phase: f32| ((clock.fraction(periods) + phase) * TAU).sin();
         match self {
             Self::Still(pose) => *pose,
@@ -224,6 +274,20 @@ impl Motion {
                 let leg = legs.iter().find(|leg| time < leg.end).unwrap_or(&legs[legs.len() - 1]);
                 let share = ((time - leg.start) / (leg.end - leg.start).max(1e-3)).clamp(0.0, 1.0);
                 Affine3A::from_translation(leg.from.lerp(leg.to, share))
+            }
+            Self::Body(chain) => {
+                let feet = Vec3::from(camera.eye) - Vec3::Z * EYE_HEIGHT;
+                Affine3A::from_translation(feet)
+                    * Affine3A::from_rotation_z(camera.yaw.to_radians())
+                    * joined(chain, clock)
+            }
+            Self::View(chain) => {
+                let axes = camera.axes();
+                let view = Affine3A {
+                    matrix3: Mat3A::from_cols(axes.forward.into(), (-axes.right).into(), axes.up.into()) * WEAPON_SCALE,
+                    translation: camera.eye.into(),
+                };
+                view * joined(chain, clock)
             }
         }
     }

@@ -281,6 +281,15 @@ pub struct Stage {
     pub mod_count: u32,
 }
 
+/// `Instance::seen_by`: rays from the eye, through water and glass too.
+pub const SEEN_BY_EYE: u32 = 1;
+/// `Instance::seen_by`: rays that a mirror or another surface has turned back.
+pub const SEEN_BY_REFLECTIONS: u32 = 2;
+/// `Instance::seen_by`: rays to lights, and all others.
+pub const SEEN_BY_SHADOWS: u32 = 4;
+/// `Instance::seen_by`: all rays.
+pub const SEEN_BY_ALL: u32 = 7;
+
 /// A placed mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -298,6 +307,8 @@ pub struct Instance {
     pub identity: u32,
     /// 1 where the transform may change.
     pub moves: u32,
+    /// Rays that meet it.
+    pub seen_by: u32,
 }
 
 /// `Light::kind`: a triangle of an emissive surface.
