@@ -25,9 +25,6 @@
 
 layout(local_size_x = 64) in;
 
-// Brightest sample of a frame that is not averaged, as a multiple of what the exposure makes white.
-const float MOST_SHOWN = 2.0;
-
 vec3 branches_of(uvec2 pixel, inout uvec2 counts) {
     vec3 radiance = vec3(0.0);
     Path path;
@@ -74,11 +71,6 @@ void main() {
         vec3 radiance = branches_of(pixel, counts);
         // A value that is not finite would stay in every history it enters.
         if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
-        // Nothing denoises these samples: in frames that are shown as they come, lamps that a lobe finds now and then are held
-        // to what a display shows as white, and more. Averaged frames take them as they are.
-        float exposure = FC.fixed_exposure > 0.0 ? FC.fixed_exposure : FC.exposure.at[0];
-        float bright = luminance(radiance) * exposure;
-        if (accumulated == 0 && bright > MOST_SHOWN) radiance *= MOST_SHOWN / bright;
         ivec2 p = ivec2(pixel);
         imageStore(image_layers, p, vec4(imageLoad(image_layers, p).rgb + radiance, 0.0));
         if (FC.view == 23) imageStore(image_secondary, p, vec4(radiance, 0.0));

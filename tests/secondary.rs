@@ -18,7 +18,7 @@ use q3rays::render::backend::Backend;
 use q3rays::render::film::Film;
 use q3rays::render::gpu_renderer::GpuRenderer;
 use q3rays::render::scene_gpu::SceneGpu;
-use q3rays::render::settings::{AmbientLight, Secondary, Settings};
+use q3rays::render::settings::{AmbientLight, Secondary, Settings, ShownEmission};
 use q3rays::scene::Scene;
 use q3rays::scene::bvh::BvhQuality;
 use q3rays::scene::camera::Camera;
@@ -163,15 +163,24 @@ fn both_ways_of_sampling_a_lobe_agree() {
     assert!(scene.lights.lights.len() >= 2);
     let (size, n) = ((24, 18), 400);
     let view = camera([30.0, 128.0, 100.0], 35.0, 0.0, 60.0);
-    let soft = settings();
+    for shown_emission in [ShownEmission::Game, ShownEmission::Radiance] {
+        agree_on_lamps(&scene, &view, size, n, shown_emission);
+    }
+}
+
+fn agree_on_lamps(scene: &Scene, view: &Camera, size: (u32, u32), n: u32, shown_emission: ShownEmission) {
+    let soft = Settings {
+        shown_emission,
+        ..settings()
+    };
     // Light samples at the lamps' middles count nothing in a lobe: its own directions find all of them.
     let alone = Settings {
         soft_shadows: false,
-        ..settings()
+        ..soft
     };
-    let cpu = CpuRenderer::new(&scene);
+    let cpu = CpuRenderer::new(scene);
     let seen = |s: &Settings| {
-        let (film, _) = cpu.accumulate(&view, size, s, 0..n, &quiet);
+        let (film, _) = cpu.accumulate(view, size, s, 0..n, &quiet);
         let sum: f64 = film.transparent.iter().map(|p| f64::from(p[1])).sum();
         let error: f64 = film.variance.iter().map(|v| f64::from(*v)).sum::<f64>().sqrt();
         (sum, error)

@@ -384,7 +384,7 @@ fn records() -> Vec<Record> {
             secondary,
             glossy,
             branches_off,
-            padding_
+            branch_share
         }),
         record!(Push {
             frame,

@@ -45,6 +45,18 @@ void push_branch(Path p) {
 }
 #endif
 
+// Whether the `n`-th branch of a path is followed, of which `share` reaches the eye, and how much it counts then: in frames
+// that are shown as they come faint ones are followed now and then, and count the more.
+bool survives(Path path, uint n, vec3 share, out float weight) {
+    weight = 1.0;
+    if (FC.branch_share <= 0.0) return true;
+    float p = min(luminance(share) / FC.branch_share, 1.0);
+    if (p >= 1.0) return true;
+    weight = 1.0 / max(p, 1e-6);
+    uint bits = bits2(FC.sequence, random_key(FC.seed, path.address, DIM_BRANCH + n), sample_index).x;
+    return unit_float(bits) < p;
+}
+
 const uint REFLECTS_NOT = 0;
 const uint REFLECTS_SMOOTH = 1;
 const uint REFLECTS_GLOSSY = 2;
@@ -140,17 +152,19 @@ float lobe_chance(uint row_, uint place, uint light) {
 }
 #endif
 
+// Radiance that a path gets from a surface by itself: see src/reference/branches.rs.
 vec3 emission_met(float pdf, Path path, SurfaceHit s, Hit hit, vec3 direction) {
+    vec3 seen = emission_seen(s, direction);
 #ifdef FOLLOWS_BRANCHES
-    if (pdf >= 0.0) {
-        uint number = FC.triangle_lights.at[hit.triangle];
-        if (number == NONE) return emission_shown(s, direction, 0);
+    uint number = pdf >= 0.0 ? FC.triangle_lights.at[hit.triangle] : NONE;
+    if (number != NONE) {
         Material material = FC.materials.at[s.material];
         bool sky = (material.flags & MATERIAL_SKY) != 0;
+        if (!s.front && !sky && (material.flags & MATERIAL_TWO_SIDED_EMISSION) == 0) return seen;
         vec3 glow = sky ? vec3(0.0) : s.glow;
-        if (!s.front && !sky && (material.flags & MATERIAL_TWO_SIDED_EMISSION) == 0) return glow;
         Light light = FC.lights.at[number];
-        vec3 radiance = emitted(material, s.uv, s.position, direction) * light.scale;
+        vec3 radiance = seen - glow;
+        if (FC.shown_emission != 0) radiance = emitted(material, s.uv, s.position, direction) * light.scale;
         float cosine = -dot(s.geometric_normal, direction);
         float weight = 1.0;
         if (pdf > 0.0 && FC.soft_shadows != 0 && cosine > 0.0) {
@@ -160,7 +174,7 @@ vec3 emission_met(float pdf, Path path, SurfaceHit s, Hit hit, vec3 direction) {
         return glow + radiance * weight;
     }
 #endif
-    return emission_seen(s, direction);
+    return seen;
 }
 
 #endif

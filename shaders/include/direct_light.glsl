@@ -23,22 +23,23 @@ LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at, uin
 Lobe light_lobe;
 // The receiver's lobe alone is wanted.
 bool lobe_alone;
-const uint BRANCH_CANDIDATES = 4;
+const uint BRANCH_CANDIDATES = 2;
 // Radiance over Fresnel's factor that the lobe reflects, as far as light samples find it.
 vec3 lobe_light;
 
 // What a light sample of the lobe counts: see src/reference/direct.rs.
-float lobe_weight(SurfaceHit at, Choice choice, LightSample s) {
+vec3 lobe_weight(SurfaceHit at, Choice choice, LightSample s) {
     Light light = FC.lights.at[choice.light];
     vec3 to = s.sky ? s.target : s.target - at.position;
     vec3 direction = normalize(to);
-    float weight = PI * lobe_brdf(light_lobe, direction) / choice.probability;
+    vec3 weight = vec3(PI * lobe_brdf(light_lobe, direction) / choice.probability);
     if (light.kind == LIGHT_TRIANGLE) {
         float cosine = abs(dot(normalize(cross(light.p1, light.p2)), direction));
         float own = choice.probability * dot(to, to) / max(cosine * light.size, 1.17549435e-38);
         weight *= FC.soft_shadows != 0 ? own / (own + lobe_pdf(light_lobe, direction)) : 0.0;
+        weight *= shown_over_lit(FC.materials.at[light.material]) / (FC.shown_emission == 0 ? light.scale : 1.0);
     }
-    return weight > 0.0 ? weight : 0.0;
+    return weight.x > 0.0 || weight.y > 0.0 || weight.z > 0.0 ? weight : vec3(0.0);
 }
 #endif
 
@@ -129,8 +130,8 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
         }
 #ifdef LIGHTS_LOBES
         if (for_lobe) {
-            float weight = kept_target > 0.0 ? lobe_weight(at, picked, kept) : 0.0;
-            if (kept_target > 0.0 && weight == 0.0) continue;
+            vec3 weight = kept_target > 0.0 ? lobe_weight(at, picked, kept) : vec3(0.0);
+            if (kept_target > 0.0 && weight == vec3(0.0)) continue;
             lobe_light = traced(kept, at, counts) * weight;
             continue;
         }

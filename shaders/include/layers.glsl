@@ -78,12 +78,13 @@ Seen see(Path path) {
                 out_.share = lit_share * lit_fog;
                 out_.direction = lit_direction;
             }
-            return out_;
+            break;
         }
         walk_on(hit);
         Material material = FC.materials.at[FC.triangles.at[hit.triangle].material];
         out_.distance = travelled + hit.t;
-        SurfaceHit s = surface_at(hit, direction, FC.cone * (1.0 + travelled / hit.t));
+        // Where it is in the map is looked up for what is shaded alone.
+        SurfaceHit s = shaded_hit(hit, direction, FC.cone * (1.0 + travelled / hit.t));
         if (!drawn(material, s.front)) continue;
         bool layer = (material.flags & MATERIAL_LAYER) != 0;
         bool follows = FC.secondary != SECONDARY_OFF && depth < FC.max_depth;
@@ -102,7 +103,7 @@ Seen see(Path path) {
                 out_.hit = hit;
                 out_.share = lit_share * fog.a;
                 out_.direction = direction;
-                return out_;
+                break;
             }
             float own = luminance(lit_share * lit.albedo);
             float rest = luminance(out_.share);
@@ -115,19 +116,26 @@ Seen see(Path path) {
                     out_.hit = lit_hit;
                     out_.share = lit_share * lit_fog / likely;
                     out_.direction = lit_direction;
-                    return out_;
+                    break;
                 }
                 out_.share /= 1.0 - likely;
             }
             pending = false;
         }
         vec3 share = out_.share * fog.a;
+        float counts = 1.0;
+        if (reflection == REFLECTS_GLOSSY && !survives(path, branch, share * s.specular, counts)) {
+            reflection = REFLECTS_NOT;
+            branch++;
+        }
         if (reflection == REFLECTS_GLOSSY) {
             out_.glossy = !layer;
             branch_count++;
+            s.specular *= counts;
 #ifdef FOLLOWS_BRANCHES
             Path from = path;
             from.depth = depth;
+            locate(s);
             push_lobe(from, material, s, direction, branch, share, out_.distance, !layer);
 #endif
             branch++;
@@ -136,14 +144,18 @@ Seen see(Path path) {
         if (reflection == REFLECTS_SMOOTH) {
             goes_back = luminance(s.albedo + s.glow + s.through) <= 0.0;
             if (!goes_back) {
-                if (FC.secondary == SECONDARY_BOTH && branch_count < MOST_BRANCHES) {
-                    branch_count++;
+                // In frames that are shown as they come, branches don't branch.
+                bool both = FC.branch_share <= 0.0 || path.depth == 0;
+                if (FC.secondary == SECONDARY_BOTH && branch_count < MOST_BRANCHES && both) {
+                    if (survives(path, branch, share * s.specular, counts)) {
+                        branch_count++;
 #ifdef FOLLOWS_BRANCHES
-                    vec3 start, back;
-                    mirrored(s, direction, start, back);
-                    push_branch(Path(start, back, share * s.specular, out_.distance, depth + 1,
-                                     branch_address(path.address, branch), -1.0, 0, 0));
+                        vec3 start, back;
+                        mirrored(s, direction, start, back);
+                        push_branch(Path(start, back, share * s.specular * counts, out_.distance, depth + 1,
+                                         branch_address(path.address, branch), -1.0, 0, 0));
 #endif
+                    }
                     branch++;
                 } else {
                     float likely = clamp(s.specular.x, LEAST_BRANCH, 1.0 - LEAST_BRANCH);
@@ -160,7 +172,7 @@ Seen see(Path path) {
             out_.emission = emission;
             out_.share *= fog.a;
             out_.direction = direction;
-            return out_;
+            break;
         }
         vec3 onward = vec3(0.0);
         if (goes_back) {
@@ -174,7 +186,7 @@ Seen see(Path path) {
             if ((material.flags & MATERIAL_PORTAL) != 0) {
                 out_.share *= s.through * fog.a;
                 depth++;
-                if (depth > FC.max_depth) return out_;
+                if (depth > FC.max_depth) break;
                 onward = direction;
                 kind = SEEN_BY_REFLECTIONS;
                 go_through(FC.triangles.at[hit.triangle].surface, s, origin, onward, out_.place);
@@ -207,6 +219,7 @@ Seen see(Path path) {
             begin_walk();
         }
     }
+    if (out_.hit.triangle != NONE) locate(out_.surface);
     return out_;
 }
 

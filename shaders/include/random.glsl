@@ -6,6 +6,7 @@ const uint SEQUENCE_RANDOM = 0;
 const uint DIM_PIXEL = 0;
 const uint DIM_LENS = 1;
 const uint DIM_LAYER = 0x4000;
+const uint DIM_BRANCH = 0x7000;
 const uint DIM_LOBE = 0x5000;
 const uint DIM_LOBE_PICK = 0x6000;
 const uint DIM_LOBE_POINT = 0x6001;

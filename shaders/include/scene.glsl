@@ -454,7 +454,7 @@ struct FrameConstants {
     uint secondary;
     uint glossy;
     uint branches_off;
-    uint padding_;
+    float branch_share;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

@@ -133,7 +133,7 @@ vec3 sky_seen(Material material, vec3 direction, Shade clouds) {
     return picture * (FC.shown_emission == 0 ? material.shown : material.sky_scale);
 }
 
-// A hit as far as geometry and material go; `cluster` and `row` are left to `surface_at`.
+// A hit as far as geometry and material go; `cluster` and `row` are left to `locate`.
 SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
     SurfaceHit s;
     Instance instance = FC.instances.at[hit.instance];
@@ -207,11 +207,11 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
     return s;
 }
 
-SurfaceHit surface_at(Hit hit, vec3 direction, float cone) {
-    SurfaceHit s = shaded_hit(hit, direction, cone);
+// Finds cluster and row of a shaded hit.
+void locate(inout SurfaceHit s) {
+    if (s.cluster != NONE) return;
     s.cluster = classify(s.position, s.geometric_normal);
     if (s.cluster != NONE) s.row = s.cluster;
-    return s;
 }
 
 // Whether a surface is drawn on the side that a ray meets.
@@ -237,19 +237,22 @@ vec3 emitted(Material material, vec2 uv, vec3 position, vec3 direction) {
     return material.emission * emission_picture(material, uv, position, direction);
 }
 
-// Radiance that a ray receives from a surface it hits, but for the light that the surface reflects; `shown` is as
-// `FC.shown_emission`.
-vec3 emission_shown(SurfaceHit s, vec3 direction, uint shown) {
+// What a light of a material is to the eye over what it lights with.
+vec3 shown_over_lit(Material material) {
+    if (FC.shown_emission != 0) return vec3(1.0);
+    bool pictured = (material.flags & MATERIAL_SKY) != 0 && (material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES)) != 0;
+    vec3 lit = pictured ? material.sky_scale : material.emission;
+    return mix(material.shown / lit, vec3(0.0), lessThanEqual(lit, vec3(0.0)));
+}
+
+// Radiance that a ray receives from a surface it hits, but for the light that the surface reflects.
+vec3 emission_seen(SurfaceHit s, vec3 direction) {
     Material material = FC.materials.at[s.material];
     if ((material.flags & MATERIAL_SKY) != 0) return s.glow;
-    vec3 factor = shown == 0 ? material.shown : material.emission;
+    vec3 factor = FC.shown_emission == 0 ? material.shown : material.emission;
     bool emits = s.front || (material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER)) != 0;
     if (!emits || factor == vec3(0.0)) return s.glow;
     return s.glow + factor * emission_picture(material, s.uv, s.position, direction);
-}
-
-vec3 emission_seen(SurfaceHit s, vec3 direction) {
-    return emission_shown(s, direction, FC.shown_emission);
 }
 
 #endif

@@ -11,7 +11,10 @@ use crate::scene::Scene;
 use crate::scene::light_cells::place;
 use crate::scene::light_power::luminance;
 use crate::scene::optics::{self, Lobe};
-use crate::scene::records::{MATERIAL_DIELECTRIC, MATERIAL_PANE, MATERIAL_TWO_SIDED_EMISSION, Material};
+use crate::scene::records::{
+    MATERIAL_DIELECTRIC, MATERIAL_PANE, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION,
+    Material,
+};
 use crate::scene::sampling::{DIM_LOBE, key, pcg, sample2};
 use glam::{Vec2, Vec3};
 
@@ -189,8 +192,8 @@ pub fn lobe_path(
     })
 }
 
-/// Radiance that a path gets from a surface by itself. A lobe gets the light that surfaces give, each light sampled in two
-/// ways and weighted by the balance heuristic (Veach 1997, section 9.2); the eye sees them as the settings want.
+/// Radiance that a path gets from a surface by itself. A lobe finds a light in two ways, each weighted by the balance heuristic
+/// (Veach 1997, section 9.2). Lights are as bright in a lobe as they are to the eye: the lobe shows their image.
 pub fn emission_met(
     scene: &Scene,
     tracer: &Tracer,
@@ -200,20 +203,21 @@ pub fn emission_met(
     hit: &Hit,
     direction: Vec3,
 ) -> Vec3 {
-    let Some(start) = lobe else {
-        return emission_seen(scene, s, direction, settings.shown_emission);
-    };
-    let Some(number) = tracer.light_of(hit.triangle) else {
-        return emission_seen(scene, s, direction, ShownEmission::Game);
+    let seen = emission_seen(scene, s, direction, settings.shown_emission);
+    let Some((start, number)) = lobe.zip(tracer.light_of(hit.triangle)) else {
+        return seen;
     };
     let material = &scene.materials[s.material as usize];
-    let sky = material.flags & crate::scene::records::MATERIAL_SKY != 0;
-    let glow = if sky { Vec3::ZERO } else { s.glow };
+    let sky = material.flags & MATERIAL_SKY != 0;
     if !s.front && !sky && material.flags & MATERIAL_TWO_SIDED_EMISSION == 0 {
-        return glow;
+        return seen;
     }
+    let glow = if sky { Vec3::ZERO } else { s.glow };
     let light = &scene.lights.lights[number as usize];
-    let radiance = emitted(scene, material, s.uv, s.position, direction, s.clock) * light.scale;
+    let radiance = match settings.shown_emission {
+        ShownEmission::Game => seen - glow,
+        ShownEmission::Radiance => emitted(scene, material, s.uv, s.position, direction, s.clock) * light.scale,
+    };
     let cosine = -s.geometric_normal.dot(direction);
     let mut weight = 1.0;
     if start.pdf > 0.0 && settings.soft_shadows && cosine > 0.0 {
@@ -224,6 +228,21 @@ pub fn emission_met(
         weight = start.pdf / (start.pdf + other);
     }
     glow + radiance * weight
+}
+
+/// What a light of a material is to the eye over what it lights with.
+pub fn shown_over_lit(material: &Material, shown: ShownEmission) -> Vec3 {
+    if shown == ShownEmission::Radiance {
+        return Vec3::ONE;
+    }
+    let pictured = material.flags & MATERIAL_SKY != 0 && material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES) != 0;
+    let lit = Vec3::from(if pictured {
+        material.sky_scale
+    } else {
+        material.emission
+    });
+    let ratio = |i: usize| if lit[i] > 0.0 { material.shown[i] / lit[i] } else { 0.0 };
+    Vec3::new(ratio(0), ratio(1), ratio(2))
 }
 
 /// Whether both ways are followed at the `n`-th interface of an eye ray.

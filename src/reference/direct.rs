@@ -1,11 +1,12 @@
 //! Direct light by next-event estimation. Counterpart of `shaders/direct.comp`.
 
+use super::branches::shown_over_lit;
 use super::light_choice::{Chances, LobeChances};
 use super::light_sample::{LightSample, PointSampling, Target, sample_light};
 use super::surface::{SurfaceHit, offset_point};
 use super::trace::Tracer;
 use super::visibility::visible;
-use crate::render::settings::{LightSampling, Settings};
+use crate::render::settings::{LightSampling, Settings, ShownEmission};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
 use crate::scene::light_cells::place;
@@ -146,7 +147,7 @@ pub fn lobe_light(
         Target::Sky(d) => d,
         Target::Point(p) => (p - at.position).normalize_or_zero(),
     };
-    let mut weight = PI * lobe.brdf(direction) / choice.probability;
+    let mut weight = Vec3::splat(PI * lobe.brdf(direction) / choice.probability);
     if light.kind == LIGHT_TRIANGLE {
         let Target::Point(point) = sample.target else {
             return Vec3::ZERO;
@@ -158,11 +159,15 @@ pub fn lobe_light(
         // With hard shadows a lamp is a point to light samples, and the lobe's directions find all of it.
         let share = own / (own + lobe.pdf(direction));
         weight *= if settings.soft_shadows { share } else { 0.0 };
+        weight *= shown_over_lit(&scene.materials[light.material as usize], settings.shown_emission);
+        if settings.shown_emission == ShownEmission::Game {
+            weight /= light.scale;
+        }
     }
-    if weight <= 0.0 || weight.is_nan() {
+    if weight.max_element() <= 0.0 || !weight.is_finite() {
         return Vec3::ZERO;
     }
-    estimator.traced(Some(sample), weight, counts)
+    weight * estimator.traced(Some(sample), 1.0, counts)
 }
 
 struct Estimator<'a> {

@@ -26,6 +26,10 @@ use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps
 use crate::scene::camera::Camera;
 use std::sync::Arc;
 
+/// In frames that are shown as they come, a branch of less than this share of what the eye sees is followed in proportion to
+/// it.
+const LEAST_BRANCH_SHARE: f32 = 0.25;
+
 /// What a frame shows and how.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameInput {
@@ -190,7 +194,7 @@ impl FrameRenderer {
         self.primary.record(&mut r, &view.focus[slot], listed)?;
         if let Some(pixels) = listed {
             self.secondary
-                .record(&mut r, pixels, &view.counters[slot], &view.focus[slot], &view.exposure)?;
+                .record(&mut r, pixels, &view.counters[slot], &view.focus[slot])?;
         }
         let denoises = input.denoises();
         if denoises && constants.changed != 0 {
@@ -274,6 +278,12 @@ fn frame_constants(
         max_depth: s.max_depth,
         secondary: s.branches() as u32,
         glossy: u32::from(s.reflects()),
+        // Averaged frames follow every branch: the mean is the same, and each has less noise.
+        branch_share: if input.accumulated == 0 {
+            LEAST_BRANCH_SHARE
+        } else {
+            0.0
+        },
         branches_off: u32::from(scene.branches_off && s.branches() != super::settings::Secondary::Off),
         choose_layers: u32::from(s.choose_layers),
         ..base

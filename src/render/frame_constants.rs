@@ -152,7 +152,8 @@ pub struct FrameConstants {
     pub glossy: u32,
     /// The scene has surfaces that something branches off at, and this frame follows it.
     pub branches_off: u32,
-    pub padding_: u32,
+    /// A branch of less than this share is followed now and then; 0: always.
+    pub branch_share: f32,
 }
 
 /// Push constants of every pass.

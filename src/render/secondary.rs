@@ -65,14 +65,12 @@ impl Secondary {
         pixels: &SecondaryPixels,
         counters: &Buffer,
         focus: &Buffer,
-        exposure: &Buffer,
     ) -> Result<(), GpuError> {
         let uses = [
             Use::buffer(&pixels.buffer, Access::Indirect),
             Use::buffer(&pixels.buffer, Access::ComputeRead),
             Use::buffer(counters, Access::ComputeReadWrite),
             Use::buffer(focus, Access::ComputeRead),
-            Use::buffer(exposure, Access::ComputeRead),
             Use::image(r.gbuffer.layers(), Access::ComputeReadWrite),
             Use::image(r.gbuffer.secondary(), Access::ComputeReadWrite),
         ];

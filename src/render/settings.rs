@@ -193,7 +193,7 @@ impl Settings {
 }
 
 /// Candidates of light that branches off, as a multiple.
-pub const BRANCH_CANDIDATES: u32 = 4;
+pub const BRANCH_CANDIDATES: u32 = 2;
 /// Most levels of the denoiser's filter.
 const MOST_LEVELS: u32 = 5;
 /// First of the views of the denoiser's filter levels in [`crate::console::cvars::VIEWS`].

@@ -23,6 +23,8 @@ pub const DIM_SHUTTER: u32 = 2;
 pub const DIM_LAYER: u32 = 0x4000;
 /// Direction of light that a lobe reflects, at the i-th branch of a path.
 pub const DIM_LOBE: u32 = 0x5000;
+/// Whether the i-th branch of a path is followed, on the GPU in frames that are shown as they come.
+pub const DIM_BRANCH: u32 = 0x7000;
 /// Choice of the light that a lobe is lit by.
 pub const DIM_LOBE_PICK: u32 = 0x6000;
 /// Position on it.
