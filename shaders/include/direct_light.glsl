@@ -32,6 +32,8 @@ vec3 lobe_weight(SurfaceHit at, Choice choice, LightSample s) {
     Light light = FC.lights.at[choice.light];
     vec3 to = s.sky ? s.target : s.target - at.position;
     vec3 direction = normalize(to);
+    bool unseen = light.kind == LIGHT_SPHERE || light.kind == LIGHT_DOME;
+    if (FC.shown_emission == 0 && unseen) return vec3(0.0);
     vec3 weight = vec3(PI * lobe_brdf(light_lobe, direction) / choice.probability);
     if (light.kind == LIGHT_TRIANGLE) {
         float cosine = abs(dot(normalize(cross(light.p1, light.p2)), direction));

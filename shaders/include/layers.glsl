@@ -142,7 +142,7 @@ Seen see(Path path) {
         }
         bool goes_back = false;
         if (reflection == REFLECTS_SMOOTH) {
-            goes_back = luminance(s.albedo + s.glow + s.through) <= 0.0;
+            goes_back = luminance(s.albedo + emission + s.through) <= 0.0;
             if (!goes_back) {
                 // In frames that are shown as they come, branches don't branch.
                 bool both = FC.branch_share <= 0.0 || path.depth == 0;

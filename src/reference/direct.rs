@@ -12,7 +12,7 @@ use crate::scene::clusters::LightLists;
 use crate::scene::light_cells::place;
 use crate::scene::light_power::luminance;
 use crate::scene::optics::Lobe;
-use crate::scene::records::LIGHT_TRIANGLE;
+use crate::scene::records::{LIGHT_DOME, LIGHT_SPHERE, LIGHT_TRIANGLE};
 use crate::scene::sampling::{
     DIM_CANDIDATE_PICK, DIM_CANDIDATE_POINT, DIM_EVERY_LIGHT, DIM_LIGHT_PICK, DIM_LIGHT_POINT, DIM_LOBE_PICK,
     DIM_LOBE_POINT, MAX_CANDIDATES, bits2, key, unit,
@@ -147,6 +147,11 @@ pub fn lobe_light(
         Target::Sky(d) => d,
         Target::Point(p) => (p - at.position).normalize_or_zero(),
     };
+    // What the eye does not see has no image in a lobe either.
+    let unseen = matches!(light.kind, LIGHT_SPHERE | LIGHT_DOME);
+    if settings.shown_emission == ShownEmission::Game && unseen {
+        return Vec3::ZERO;
+    }
     let mut weight = Vec3::splat(PI * lobe.brdf(direction) / choice.probability);
     if light.kind == LIGHT_TRIANGLE {
         let Target::Point(point) = sample.target else {

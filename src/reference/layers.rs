@@ -184,7 +184,7 @@ pub fn see(
             out.glossy = sampled;
         }
         if reflection == Reflection::Smooth {
-            let rest = luminance((surface.albedo + surface.glow + surface.through).into());
+            let rest = luminance((surface.albedo + emission + surface.through).into());
             let mut goes_back = rest <= 0.0;
             if !goes_back {
                 if follows_both(settings, branches.count) {
