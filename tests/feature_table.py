@@ -60,24 +60,28 @@ def main():
     parser.add_argument("--original", required=True)
     parser.add_argument("--out", required=True, type=pathlib.Path)
     parser.add_argument("--spp", default="48")
+    parser.add_argument("--only", nargs="*", help="features to make pictures of; the others keep theirs")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     rows = []
     for feature, maps, name, view in choose(args.q3rays):
         x, y, z = view["eye"]
         stem = feature.lower().replace(" ", "_")
+        rows.append(f"| {feature} | {maps} | {name} | `{view['material']}` | ![{feature}]({stem}.jpg) |")
+        if args.only is not None and feature not in args.only:
+            continue
         with tempfile.TemporaryDirectory() as folder:
             ours, original = f"{folder}/ours.png", f"{folder}/original.png"
             size = f"{SIZE[0]}x{SIZE[1]}"
             subprocess.run([args.q3rays, "render", name, "--backend", "cpu", f"--camera={x},{y},{z},0,{view['yaw']}", "--size",
-                            size, "--spp", args.spp, "--time", "1", "--out", ours], check=True, capture_output=True)
+                            size, "--spp", args.spp, "--time", "1", "--player", "sarge", "+set", "cg_drawGun", "0",
+                            "--out", ours], check=True, capture_output=True)
             subprocess.run(["bash", args.original, name, f"{x} {y} {z - EYE_HEIGHT} {view['yaw']}", original, "lit", size],
                            check=True, stdin=subprocess.DEVNULL, capture_output=True)
             pair = Image.new("RGB", (2 * CROP[0] + 4, CROP[1]), "white")
             pair.paste(crop(ours, view["at"]), (0, 0))
             pair.paste(crop(original, view["at"]), (CROP[0] + 4, 0))
             pair.save(args.out / f"{stem}.jpg", quality=80)
-        rows.append(f"| {feature} | {maps} | {name} | `{view['material']}` | ![{feature}]({stem}.jpg) |")
         print(feature, name, view["material"], file=sys.stderr, flush=True)
     head = ["# Features of the shader language, q3rays beside the raster original", "",
             "Made by `tests/feature_table.py`, which also chooses map and view. Left: q3rays, "

@@ -80,7 +80,7 @@ fn mirrors_show_the_body_and_the_eye_sees_the_weapon() {
 fn players_breathe_between_the_frames_of_their_files() {
     let played = load(Some(Player::default()));
     let body = |p: &&q3rays::scene::entity_geometry::Placement| matches!(p.motion, Motion::Body(_)) && p.steps > 1;
-    let torso = played.placements.iter().filter(body).last().unwrap();
+    let torso = played.placements.iter().rfind(body).unwrap();
     let meshes = &played.geometry.meshes;
     let at = |seconds: f64| {
         let moment = Clock::from_seconds(seconds).into();
