@@ -5,12 +5,12 @@
 
 For each feature that `q3rays info MAP --views` knows, a map is chosen (of those that have it the one that has been chosen
 least, by name), the view that it names is rendered, and the part of it around the surface is put beside the same part of the
-original's picture. SCRIPT is called as `SCRIPT MAP "X Y Z YAW" OUT.png lit WxH`, with the player's origin, 26 units under the
-eye. Writes one picture per feature and README.md with the table. Needs Pillow.
+original's picture. SCRIPT is called as `SCRIPT MAP "X Y Z YAW" OUT.png lit WxH`, with the place that `setviewpos` is given. Writes one picture per feature and README.md with the table. Needs Pillow.
 """
 
 import argparse
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -21,6 +21,9 @@ from PIL import Image
 SIZE = (640, 360)
 CROP = (240, 180)
 EYE_HEIGHT = 26
+# `setviewpos` lifts the player by a unit and throws them forward; noclip's friction stops them this many units on.
+LIFT = 1
+THROWN = 26.4
 
 
 def views(program, name):
@@ -66,6 +69,8 @@ def main():
     rows = []
     for feature, maps, name, view in choose(args.q3rays):
         x, y, z = view["eye"]
+        yaw = math.radians(view["yaw"])
+        origin = (x - THROWN * math.cos(yaw), y - THROWN * math.sin(yaw), z - EYE_HEIGHT - LIFT)
         stem = feature.lower().replace(" ", "_")
         rows.append(f"| {feature} | {maps} | {name} | `{view['material']}` | ![{feature}]({stem}.jpg) |")
         if args.only is not None and feature not in args.only:
@@ -76,7 +81,7 @@ def main():
             subprocess.run([args.q3rays, "render", name, "--backend", "cpu", f"--camera={x},{y},{z},0,{view['yaw']}", "--size",
                             size, "--spp", args.spp, "--time", "1", "--player", "sarge", "+set", "cg_drawGun", "0",
                             "--out", ours], check=True, capture_output=True)
-            subprocess.run(["bash", args.original, name, f"{x} {y} {z - EYE_HEIGHT} {view['yaw']}", original, "lit", size],
+            subprocess.run(["bash", args.original, name, " ".join(map(str, [*origin, view["yaw"]])), original, "lit", size],
                            check=True, stdin=subprocess.DEVNULL, capture_output=True)
             pair = Image.new("RGB", (2 * CROP[0] + 4, CROP[1]), "white")
             pair.paste(crop(ours, view["at"]), (0, 0))
