@@ -139,6 +139,8 @@ Seen see(Path path) {
             push_lobe(from, material, s, direction, branch, share, out_.distance, !layer);
 #endif
             branch++;
+            // The stack holds no more branches than this allows, however many layers the ray meets.
+            depth++;
         }
         bool goes_back = false;
         if (reflection == REFLECTS_SMOOTH) {

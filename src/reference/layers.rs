@@ -181,6 +181,8 @@ pub fn see(
                 sampled,
             ));
             branch += 1;
+            // A ray has no more branches than this allows, however many layers it meets.
+            depth += 1;
             out.glossy = sampled;
         }
         if reflection == Reflection::Smooth {

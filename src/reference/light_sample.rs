@@ -10,7 +10,7 @@ use crate::scene::records::{
     LIGHT_DOME, LIGHT_EVEN, LIGHT_LINEAR, LIGHT_NO_COSINE, LIGHT_SPHERE, LIGHT_SPOT, LIGHT_SUN, LIGHT_TRIANGLE,
     LIGHT_TWO_SIDED, Light,
 };
-use crate::scene::sampling::{disc, triangle};
+use crate::scene::sampling::{disc, tangents, triangle};
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
@@ -29,17 +29,6 @@ pub struct LightSample {
     /// Contribution to irradiance/π if nothing is in the way.
     pub value: Vec3,
     pub target: Target,
-}
-
-/// Orthonormal tangents of a unit vector (Duff et al. 2017).
-pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
-    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    (
-        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-        Vec3::new(b, sign + n.y * n.y * a, -n.y),
-    )
 }
 
 /// How the point of a light is sampled.

@@ -1,5 +1,6 @@
 //! Reflection and refraction: Fresnel's equations and a GGX lobe. Counterpart of `shaders/include/optics.glsl`.
 
+use super::sampling::tangents;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -59,17 +60,6 @@ pub struct Lobe {
     pub view: Vec3,
     /// Width: the square of the roughness.
     pub alpha: f32,
-}
-
-/// Orthonormal tangents of a unit vector (Duff et al. 2017).
-fn tangents(n: Vec3) -> (Vec3, Vec3) {
-    let s = if n.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (s + n.z);
-    let b = n.x * n.y * a;
-    (
-        Vec3::new(1.0 + s * n.x * n.x * a, s * b, -s * n.x),
-        Vec3::new(b, s + n.y * n.y * a, -n.y),
-    )
 }
 
 impl Lobe {

@@ -5,6 +5,8 @@
 //! Hash-based Owen Scrambling"), independently scrambled and shuffled per pixel and dimension pair; [`Sequence::Random`]
 //! is white noise by the PCG hash (Jarzynski and Olano 2020).
 
+use glam::Vec3;
+
 /// Which kind of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -138,6 +140,17 @@ pub fn triangle([u, v]: [f32; 2]) -> [f32; 2] {
         let y = v * 0.5;
         [u - y, y]
     }
+}
+
+/// Orthonormal tangents of a unit vector (Duff et al. 2017).
+pub fn tangents(n: Vec3) -> (Vec3, Vec3) {
+    let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    (
+        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vec3::new(b, sign + n.y * n.y * a, -n.y),
+    )
 }
 
 #[cfg(test)]
