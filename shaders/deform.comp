@@ -19,7 +19,7 @@ void main() {
     for (uint i = 0; i < 3; i++) {
         uint vertex = FC.triangles.at[t.triangle].vertices[i];
         // Triangles that share a vertex write the same to it.
-        Moved v = deformed(vertex, FC.clock, FC.eye);
+        Moved v = deformed(vertex, false);
         p[i] = v.position;
         WritePositions(FC.positions).at[vertex] = v.position;
         WriteAttributes(FC.attributes).at[vertex].normal = v.normal;

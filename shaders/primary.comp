@@ -21,7 +21,7 @@ vec3 old_position_of(Instance i, Hit hit) {
     vec3 p[3];
     for (uint k = 0; k < 3; k++) {
         uint vertex = t.vertices[k];
-        p[k] = vertex >= FC.first_dynamic_vertex ? deformed(vertex, FC.old_clock, FC.old_eye).position
+        p[k] = vertex >= FC.first_dynamic_vertex ? deformed(vertex, true).position
                                                  : FC.positions.at[vertex];
     }
     vec2 b = hit.barycentrics;

@@ -29,10 +29,11 @@ fn settings() -> Settings {
     }
 }
 
-fn input(camera: &Camera, settings: &Settings, index: u32) -> FrameInput {
+fn input(camera: &Camera, settings: &Settings, index: u32) -> FrameInput<'static> {
     FrameInput {
         camera: *camera,
         settings: *settings,
+        lights: &[],
         sample_index: index,
         accumulated: 0,
         exposure_blend: 1.0,

@@ -248,6 +248,7 @@ fn moved_points(gpu: &SceneGpu, scene: &Scene, size: (u32, u32)) {
                 antialiasing: false,
                 ..settings()
             },
+            lights: &[],
             sample_index: index,
             accumulated: 0,
             exposure_blend: 1.0,
@@ -263,8 +264,8 @@ fn moved_points(gpu: &SceneGpu, scene: &Scene, size: (u32, u32)) {
     let (objects, motions) = (words(view.gbuffer.object()), words(view.gbuffer.motion()));
     let eye = Vec3::from(view_camera.eye);
     let at = |clock| {
-        let g = &scene.geometry;
-        q3rays::scene::dynamic_geometry::all(g, &scene.materials, &scene.tables.deforms, clock, eye)
+        // The world's own surfaces deform here: nothing carries them.
+        q3rays::scene::dynamic_geometry::all(scene, &[], clock, eye)
     };
     let [before, now] = moments.map(at);
     let first = scene.geometry.dynamic.vertices.start;
@@ -358,6 +359,7 @@ fn a_mirror_shows_what_an_eye_behind_it_sees() {
             let input = FrameInput {
                 camera: c,
                 settings: still,
+                lights: &[],
                 sample_index: index,
                 accumulated: 0,
                 exposure_blend: 1.0,

@@ -24,7 +24,7 @@ fn chances<'a>(scene: &'a Scene, light_sampling: LightSampling, at: &SurfaceHit)
         light_sampling,
         ..Settings::default()
     };
-    Chances::new(scene, &settings, &scene.rows.pvs, at.row, at)
+    Chances::new(scene, &[], &settings, &scene.rows.pvs, at.row, at)
 }
 
 /// Points on random surfaces of a map, as receivers.

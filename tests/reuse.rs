@@ -44,6 +44,7 @@ fn last_frame(renderer: &GpuRenderer, camera: &Camera, settings: &Settings, step
         let input = FrameInput {
             camera,
             settings: *settings,
+            lights: &[],
             sample_index: index,
             accumulated: 0,
             exposure_blend: 1.0,
@@ -140,6 +141,7 @@ fn history_ends_where_reuse_does() {
         let frame = |index: u32, reuse: bool, seed: u32| FrameInput {
             camera,
             settings: Settings { seed, ..settings },
+            lights: &[],
             sample_index: index,
             accumulated: 0,
             exposure_blend: 1.0,

@@ -154,7 +154,8 @@ fn records() -> Vec<Record> {
             position,
             normal,
             quad,
-            material
+            material,
+            instance
         }),
         record!(DynamicTriangle { triangle, cwbvh, bvh2 }),
         record!(TcMod {
@@ -291,6 +292,7 @@ fn records() -> Vec<Record> {
             dynamic_triangles,
             instances,
             lights,
+            guest_lights,
             bsp_nodes,
             light_rows,
             light_runs,
@@ -384,7 +386,9 @@ fn records() -> Vec<Record> {
             secondary,
             glossy,
             branches_off,
-            branch_share
+            branch_share,
+            guest_count,
+            draw_sun
         }),
         record!(Push {
             frame,

@@ -152,9 +152,34 @@ float lobe_chance(uint row_, uint place, uint light) {
 }
 #endif
 
+const float SHOWN_SUN = 4.0 * 64.0 / 255.0;
+
+// Radiance of the suns' discs in a direction: see src/reference/branches.rs.
+vec3 suns_seen(vec3 direction) {
+    float azimuth = atan(direction.y, direction.x);
+    float elevation = asin(clamp(direction.z, -1.0, 1.0));
+    vec3 sum = vec3(0.0);
+    uint count = FC.light_rows.at[FC.all_row].light_count;
+    [[dont_unroll]] for (uint i = FC.finite_lights; i < count; i++) {
+        Light sun = FC.lights.at[i];
+        float across = azimuth - sun.p1.x;
+        across -= 2.0 * PI * round(across / (2.0 * PI));
+        float off = elevation - sun.p1.y;
+        float r2 = sun.p1.z * sun.p1.z;
+        if (across * across + off * off > r2) continue;
+        vec3 radiance = sun.radiance / (r2 * max(cos(elevation), 1e-4));
+        float most = max(radiance.x, max(radiance.y, radiance.z));
+        sum += FC.shown_emission == 0 ? radiance * min(SHOWN_SUN / max(most, 1.17549435e-38), 1.0) : radiance;
+    }
+    return sum;
+}
+
 // Radiance that a path gets from a surface by itself: see src/reference/branches.rs.
 vec3 emission_met(float pdf, Path path, SurfaceHit s, Hit hit, vec3 direction) {
     vec3 seen = emission_seen(s, direction);
+    // Light samples of a lobe have found the suns.
+    bool sunny = FC.draw_sun != 0 && pdf < 0.0 && (FC.materials.at[s.material].flags & MATERIAL_SKY) != 0;
+    if (sunny) seen += suns_seen(direction);
 #ifdef FOLLOWS_BRANCHES
     uint number = pdf >= 0.0 ? FC.triangle_lights.at[hit.triangle] : NONE;
     if (number != NONE) {

@@ -54,8 +54,15 @@ Moved pivoted(Moved v, vec3 quad[4], vec3 eye) {
     return Moved(middle + axis * dot(d, axis) + cross(axis, normal) * dot(d, across), normal);
 }
 
-// A dynamic vertex at a moment, seen from `eye`.
-Moved deformed(uint vertex, uint clock, vec3 eye) {
+// A point of the world in the space of an instance that has been moved rigidly.
+vec3 to_carrier(vec4 rows[3], vec3 p) {
+    vec3 d = p - vec3(rows[0].w, rows[1].w, rows[2].w);
+    return rows[0].xyz * d.x + rows[1].xyz * d.y + rows[2].xyz * d.z;
+}
+
+// A dynamic vertex in this frame or the one before, in the space of its mesh.
+Moved deformed(uint vertex, bool before) {
+    uint clock = before ? FC.old_clock : FC.clock;
     RestVertex rest = FC.rest_vertices.at[vertex - FC.first_dynamic_vertex];
     Moved v = Moved(rest.position, rest.normal);
     if (rest.material == NONE) return v;
@@ -81,6 +88,11 @@ Moved deformed(uint vertex, uint clock, vec3 eye) {
             v.position += d.direction * wave_value(d.wave, d.wave.phase + fraction_at(clock, d.wave.rate));
         } else {
             vec3 quad[4];
+            vec3 eye = before ? FC.old_eye : FC.eye;
+            if (rest.instance != NONE) {
+                Instance carrier = FC.instances.at[rest.instance];
+                eye = to_carrier(before ? carrier.old_object_to_world : carrier.object_to_world, eye);
+            }
             for (uint k = 0; k < 4; k++) quad[k] = FC.rest_vertices.at[rest.quad - FC.first_dynamic_vertex + k].position;
             if (d.kind == DEFORM_AUTOSPRITE) v = sprite(v, quad, eye);
             else v = pivoted(v, quad, eye);

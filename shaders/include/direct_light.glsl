@@ -15,7 +15,7 @@ uvec2 random_bits(uint address, uint dimension) {
 LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at, uint points) {
     uvec2 bits = random_bits(address, dimension);
     vec2 u = vec2(unit_float(bits.x), unit_float(bits.y));
-    return sample_light(FC.lights.at[light], at, u, points);
+    return sample_light(light_at(light), at, u, points);
 }
 
 #ifdef LIGHTS_LOBES
@@ -29,7 +29,7 @@ vec3 lobe_light;
 
 // What a light sample of the lobe counts: see src/reference/direct.rs.
 vec3 lobe_weight(SurfaceHit at, Choice choice, LightSample s) {
-    Light light = FC.lights.at[choice.light];
+    Light light = light_at(choice.light);
     vec3 to = s.sky ? s.target : s.target - at.position;
     vec3 direction = normalize(to);
     bool unseen = light.kind == LIGHT_SPHERE || light.kind == LIGHT_DOME;
@@ -61,7 +61,7 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     LightRow row = chances.row;
     bool every = FC.random_lights == 0;
     bool resampled = !every && FC.light_sampling == SAMPLING_RESERVOIR;
-    uint count = every ? row.light_count : FC.random_lights;
+    uint count = every ? row.light_count + FC.guest_count : FC.random_lights;
     // One light of several candidates is kept in proportion to what each gives without visibility.
 #ifdef LIGHTS_LOBES
     // What branches off is not denoised.
@@ -101,7 +101,11 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
                 if (points == POINTS_SOLID_ANGLE) points = POINTS_AREA;
             } else
 #endif
-            if (every) {
+            if (every && i >= row.light_count) {
+                choice.light = GUEST_LIGHT + (i - row.light_count);
+                choice.probability = 1.0;
+                dimension = DIM_EVERY_LIGHT + choice.light;
+            } else if (every) {
                 LightRun run = FC.light_runs.at[row.first_run + r];
                 choice.light = run.first_light + in_run;
                 choice.probability = 1.0;

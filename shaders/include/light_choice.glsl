@@ -310,13 +310,58 @@ Chances chances_at(SurfaceHit at) {
     return chances;
 }
 
-// Chooses with 32 random bits.
-Choice choose_light(Chances chances, SurfaceHit at, uint bits) {
+Choice choose_of_map(Chances chances, SurfaceHit at, uint bits) {
     if (chances.row.light_count == 0) return NO_CHOICE;
     if (FC.light_sampling == SAMPLING_UNIFORM) return choose_uniform(chances.row, bits);
     if (FC.light_sampling == SAMPLING_POWER) return choose_power(chances.row, bits);
     if (chances.cell.count != 0) return choose_by_cell(chances.cell, bits);
     return choose_by_tree(chances.row, at, bits);
+}
+
+// What a guest may give to a receiver.
+float guest_importance(Light light, SurfaceHit at) {
+    vec3 to = light.p0 - at.position;
+    if (dot(to, at.geometric_normal) + light.size <= 0.0) return 0.0;
+    float reach = light.size * light.size;
+    return luminance(light.radiance) * reach / max(dot(to, to), reach);
+}
+
+// A guest in proportion to its importance; `sum`: of all.
+Choice choose_guest(SurfaceHit at, float u, out float sum) {
+    sum = 0.0;
+    [[dont_unroll]] for (uint i = 0; i < FC.guest_count; i++) sum += guest_importance(FC.guest_lights.at[i], at);
+    Choice chosen = NO_CHOICE;
+    float below = 0.0;
+    [[dont_unroll]] for (uint i = 0; i < FC.guest_count && sum > 0.0; i++) {
+        float one = guest_importance(FC.guest_lights.at[i], at);
+        below += one;
+        if (one > 0.0) chosen = Choice(GUEST_LIGHT + i, one / sum);
+        if (u * sum < below) break;
+    }
+    return chosen;
+}
+
+// A quarter of all choices: see src/scene/guests.rs.
+const uint GUEST_BITS = 1u << 30;
+
+// Chooses with 32 random bits.
+Choice choose_light(Chances chances, SurfaceHit at, uint bits) {
+    float share = 1.0;
+    if (FC.guest_count != 0) {
+        bool only = chances.row.light_count == 0;
+        float sum;
+        Choice guest = choose_guest(at, only ? unit_float(bits) : unit_float(bits << 2), sum);
+        if (only) return guest;
+        if (guest.light != NONE) {
+            float taken = float(GUEST_BITS) / 4294967296.0;
+            if (bits < GUEST_BITS) return Choice(guest.light, guest.probability * taken);
+            share = 1.0 - taken;
+            bits = pcg(bits);
+        }
+    }
+    Choice choice = choose_of_map(chances, at, bits);
+    choice.probability *= share;
+    return choice;
 }
 
 #endif

@@ -6,6 +6,30 @@
 
 const float PI = 3.14159265358979;
 
+// Lights of numbers from here on are the frame's own: see src/scene/guests.rs.
+const uint GUEST_LIGHT = 0x80000000u;
+
+// A light where it is now: what carries it may have moved. A guest that has left (a reservoir may remember it) is dark.
+Light light_at(uint number) {
+    if (number >= GUEST_LIGHT) {
+        uint guest = number - GUEST_LIGHT;
+        Light light = FC.guest_lights.at[min(guest, max(FC.guest_count, 1) - 1)];
+        if (guest >= FC.guest_count) light.radiance = vec3(0.0);
+        return light;
+    }
+    Light light = FC.lights.at[number];
+    if (light.instance != NONE) {
+        Instance carrier = FC.instances.at[light.instance];
+        mat4x3 now = transpose(mat3x4(carrier.object_to_world[0], carrier.object_to_world[1], carrier.object_to_world[2]));
+        light.p0 = now * vec4(light.p0, 1.0);
+        if (light.kind == LIGHT_TRIANGLE) {
+            light.p1 = now * vec4(light.p1, 0.0);
+            light.p2 = now * vec4(light.p2, 0.0);
+        }
+    }
+    return light;
+}
+
 // How the point of a light is sampled.
 const uint POINTS_CENTRE = 0;
 const uint POINTS_AREA = 1;

@@ -27,7 +27,7 @@ SurfaceHit receiver_of(Reservoir r) {
 }
 
 LightSample sample_point(LightPoint p, SurfaceHit at) {
-    return sample_light(FC.lights.at[p.light], at, p.u, point_sampling());
+    return sample_light(light_at(p.light), at, p.u, point_sampling());
 }
 
 // A number for a decision between samples. Such numbers must not depend on those of earlier frames, which made the samples

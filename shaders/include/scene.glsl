@@ -90,6 +90,7 @@ struct RestVertex {
     vec3 normal;
     uint quad;
     uint material;
+    uint instance;
 };
 
 struct Portal {
@@ -361,6 +362,7 @@ struct FrameConstants {
     DynamicTriangles dynamic_triangles;
     Instances instances;
     Lights lights;
+    Lights guest_lights;
     BspNodes bsp_nodes;
     LightRows light_rows;
     LightRuns light_runs;
@@ -455,6 +457,8 @@ struct FrameConstants {
     uint glossy;
     uint branches_off;
     float branch_share;
+    uint guest_count;
+    uint draw_sun;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

@@ -105,6 +105,7 @@ pub fn run_frames(
                     ..*job.settings
                 }
             },
+            lights: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

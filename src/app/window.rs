@@ -211,6 +211,7 @@ impl Shown {
             } else {
                 now
             },
+            lights: &[],
             sample_index: self.frame,
             accumulated: self.accumulated,
             exposure_blend: (EXPOSURE_RATE * seconds).min(1.0),

@@ -106,6 +106,7 @@ impl DenoiserBench {
         let input = FrameInput {
             camera: *camera,
             settings: *settings,
+            lights: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

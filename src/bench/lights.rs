@@ -208,6 +208,7 @@ impl LightsBench {
         let input = FrameInput {
             camera: self.camera,
             settings: *settings,
+            lights: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -286,6 +286,27 @@ pub const CVARS: &[Cvar] = &[
         1,
         "shows the weapon before the eye, where there is a player",
     ),
+    int(
+        "r_drawSun",
+        0,
+        0,
+        1,
+        "shows the discs of suns: most skies have one in their picture already",
+    ),
+    float(
+        "rt_flashlight",
+        0.0,
+        0.0,
+        10000.0,
+        "brightness of a lamp in the player's hand, as of a light entity (300 is usual); 0: off",
+    ),
+    int(
+        "r_lodbias",
+        0,
+        -2,
+        2,
+        "levels by which models have less detail than their size calls for; -2 always shows all there is",
+    ),
     float("cg_fov", 90.0, 1.0, 179.0, "horizontal field of view, degrees"),
     float("sensitivity", 5.0, 0.01, 100.0, "mouse sensitivity"),
     int(

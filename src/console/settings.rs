@@ -86,6 +86,9 @@ pub fn settings(cvars: &Cvars) -> Settings {
         glossy: on("rt_glossy"),
         choose_layers: true,
         draw_gun: on("cg_drawGun"),
+        lod_bias: number("r_lodbias") as i32,
+        flashlight: number("rt_flashlight") as f32,
+        draw_sun: on("r_drawSun"),
         clock: Clock::default(),
         shutter: number("rt_motionblur") as f32 / FRAME_RATE,
     }

@@ -94,11 +94,7 @@ mod tests {
                 radiance: *radiance,
                 scale: 1.0,
             };
-            let reach = LightReach {
-                clusters: None,
-                front: None,
-            };
-            table.push(*source, light, reach);
+            table.push(*source, light, LightReach::still(None, None));
         }
         table
     }

@@ -70,15 +70,12 @@ pub fn apply(scene: &mut Scene, file: &LightsFile, known: bool) {
             max: light.origin + record.size,
         };
         let clusters = scene.bsp.cluster_at(light.origin);
-        let reach = LightReach {
-            clusters: clusters.map(|_| scene.clusters.in_box(&scene.bsp, around)),
-            front: None,
-        };
-        table.push(LightSource::Recovered, record, reach);
+        let clusters = clusters.map(|_| scene.clusters.in_box(&scene.bsp, around));
+        table.push(LightSource::Recovered, record, LightReach::still(clusters, None));
     }
     if file.sky != Vec3::ZERO {
-        let placements = scene.mesh_placements();
-        table.add_even_sky(&scene.light_inputs(&placements), file.sky);
+        let standings = scene.standings();
+        table.add_even_sky(&scene.light_inputs(&standings), file.sky);
     }
     scene.relight(table);
 }

@@ -23,10 +23,8 @@ impl<'a> Occluders<'a> {
     /// Builds the trees.
     pub fn new(scene: &'a Scene) -> Self {
         let mut tracer = Tracer::new(scene);
-        let dynamic = scene.geometry.dynamic.mesh;
-        tracer
-            .instances
-            .retain(|i| i.mesh == 0 || (dynamic != 0 && i.mesh == dynamic));
+        let of_world = |mesh: u32| scene.geometry.dynamic.carrier(mesh as usize) == 0;
+        tracer.instances.retain(|i| of_world(i.mesh));
         Self {
             scene,
             filtered: compiled_with(scene, "-filter"),

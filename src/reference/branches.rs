@@ -10,13 +10,15 @@ use crate::render::settings::{Secondary, Settings, ShownEmission};
 use crate::scene::Scene;
 use crate::scene::light_cells::place;
 use crate::scene::light_power::luminance;
+use crate::scene::lights::LightTable;
 use crate::scene::optics::{self, Lobe};
 use crate::scene::records::{
-    MATERIAL_DIELECTRIC, MATERIAL_PANE, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES, MATERIAL_TWO_SIDED_EMISSION,
-    Material,
+    Light, MATERIAL_DIELECTRIC, MATERIAL_PANE, MATERIAL_SKY, MATERIAL_SKY_BOX, MATERIAL_STAGES,
+    MATERIAL_TWO_SIDED_EMISSION, Material,
 };
 use crate::scene::sampling::{DIM_LOBE, key, pcg, sample2};
 use glam::{Vec2, Vec3};
+use std::f32::consts::TAU;
 
 /// A share of reflected light less than this is not followed.
 pub const LEAST_BRANCH: f32 = 1.0 / 1024.0;
@@ -203,7 +205,12 @@ pub fn emission_met(
     hit: &Hit,
     direction: Vec3,
 ) -> Vec3 {
-    let seen = emission_seen(scene, s, direction, settings.shown_emission);
+    let mut seen = emission_seen(scene, s, direction, settings.shown_emission);
+    let sky = scene.materials[s.material as usize].flags & MATERIAL_SKY != 0;
+    // Light samples of a lobe have found the suns.
+    if settings.draw_sun && lobe.is_none() && sky {
+        seen += suns_seen(&scene.lights, direction, settings.shown_emission);
+    }
     let Some((start, number)) = lobe.zip(tracer.light_of(hit.triangle)) else {
         return seen;
     };
@@ -228,6 +235,30 @@ pub fn emission_met(
         weight = start.pdf / (start.pdf + other);
     }
     glow + radiance * weight
+}
+
+/// Greatest radiance of a sun's disc where emission is shown as in the game: that of a lamp without a picture.
+const SHOWN_SUN: f32 = 4.0 * 64.0 / 255.0;
+
+/// Radiance of the suns' discs in a direction. Their light is spread evenly over a disc in azimuth and elevation, as it is sampled.
+fn suns_seen(lights: &LightTable, direction: Vec3, shown: ShownEmission) -> Vec3 {
+    let azimuth = direction.y.atan2(direction.x);
+    let elevation = direction.z.clamp(-1.0, 1.0).asin();
+    let disc = |sun: &Light| {
+        let [a, e, radius] = sun.p1;
+        let across = azimuth - a;
+        let across = across - TAU * (across / TAU).round();
+        let r2 = radius * radius;
+        if across * across + (elevation - e) * (elevation - e) > r2 {
+            return Vec3::ZERO;
+        }
+        let radiance = Vec3::from(sun.radiance) / (r2 * elevation.cos().max(1e-4));
+        match shown {
+            ShownEmission::Game => radiance * (SHOWN_SUN / radiance.max_element().max(f32::MIN_POSITIVE)).min(1.0),
+            ShownEmission::Radiance => radiance,
+        }
+    };
+    lights.lights[lights.tree.finite as usize..].iter().map(disc).sum()
 }
 
 /// What a light of a material is to the eye over what it lights with.

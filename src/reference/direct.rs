@@ -9,6 +9,7 @@ use super::visibility::visible;
 use crate::render::settings::{LightSampling, Settings, ShownEmission};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
+use crate::scene::guests::GUEST_LIGHT;
 use crate::scene::light_cells::place;
 use crate::scene::light_power::luminance;
 use crate::scene::optics::Lobe;
@@ -74,8 +75,10 @@ pub fn direct_light(
     let estimator = Estimator::new(scene, tracer, settings, at, address);
     let (lists, row) = light_row(scene, settings, at.row);
     if settings.random_lights == 0 {
+        let guests = (0..tracer.guests.len() as u32).map(|g| GUEST_LIGHT + g);
         return lists
             .lights(row)
+            .chain(guests)
             .map(|light| estimator.one(light, DIM_EVERY_LIGHT + light, 1.0, counts))
             .sum();
     }
@@ -142,7 +145,7 @@ pub fn lobe_light(
         counts.shadow_skipped += 1;
         return Vec3::ZERO;
     };
-    let light = &scene.lights.lights[choice.light as usize];
+    let light = tracer.light(scene, choice.light);
     let direction = match sample.target {
         Target::Sky(d) => d,
         Target::Point(p) => (p - at.position).normalize_or_zero(),
@@ -209,13 +212,13 @@ impl<'a> Estimator<'a> {
 
     fn chances(&self) -> Chances<'_> {
         let (lists, row) = light_row(self.scene, self.settings, self.at.row);
-        Chances::new(self.scene, self.settings, lists, row, self.at)
+        Chances::new(self.scene, &self.tracer.guests, self.settings, lists, row, self.at)
     }
 
     fn sample(&self, light: u32, dimension: u32) -> Option<LightSample> {
-        let record = &self.scene.lights.lights[light as usize];
+        let record = self.tracer.light(self.scene, light);
         let u = self.bits(dimension).map(unit);
-        sample_light(self.scene, record, self.at, u, self.points)
+        sample_light(self.scene, &record, self.at, u, self.points)
     }
 
     fn traced(&self, sample: Option<LightSample>, weight: f32, counts: &mut RayCounts) -> Vec3 {

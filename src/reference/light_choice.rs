@@ -8,6 +8,7 @@ use super::surface::SurfaceHit;
 use crate::render::settings::{LightSampling, Settings};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
+use crate::scene::guests::{GUEST_LIGHT, GUEST_SHARE};
 use crate::scene::light_cells::{CellView, place};
 use crate::scene::light_power::luminance;
 use crate::scene::light_tree::LightTree;
@@ -33,12 +34,20 @@ pub struct Chances<'a> {
     sampling: LightSampling,
     /// The receiver's light cell where it is to be used and there is one.
     cell: CellView<'a>,
+    guests: &'a [Light],
 }
 
 impl<'a> Chances<'a> {
     /// `lists` and `row` are what culling leaves; light cells know of culling by the PVS alone, and the tree stands in
-    /// where there is none or no cell.
-    pub fn new(scene: &'a Scene, settings: &Settings, lists: &'a LightLists, row: u32, at: &SurfaceHit) -> Self {
+    /// where there is none or no cell. `guests`: the frame's own lights.
+    pub fn new(
+        scene: &'a Scene,
+        guests: &'a [Light],
+        settings: &Settings,
+        lists: &'a LightLists,
+        row: u32,
+        at: &SurfaceHit,
+    ) -> Self {
         let by_cell = matches!(settings.light_sampling, LightSampling::Cells | LightSampling::Reservoir);
         let record = lists.rows[row as usize];
         Self {
@@ -51,11 +60,34 @@ impl<'a> Chances<'a> {
             } else {
                 CellView::default()
             },
+            guests,
         }
     }
 
     /// Chooses with 32 random bits; `None` where no light can reach the receiver, as far as the way of choosing can tell.
     pub fn choose(&self, at: &SurfaceHit, bits: u32) -> Option<Choice> {
+        let only = self.row.light_count == 0;
+        let Some(guest) = choose_guest(self.guests, at, unit(if only { bits } else { bits << 2 })) else {
+            return self.choose_of_map(at, bits);
+        };
+        if only {
+            return Some(guest);
+        }
+        let taken = (GUEST_SHARE * 4_294_967_296.0) as u32;
+        if bits < taken {
+            return Some(Choice {
+                probability: guest.probability * GUEST_SHARE,
+                ..guest
+            });
+        }
+        let choice = self.choose_of_map(at, pcg(bits))?;
+        Some(Choice {
+            probability: choice.probability * (1.0 - GUEST_SHARE),
+            ..choice
+        })
+    }
+
+    fn choose_of_map(&self, at: &SurfaceHit, bits: u32) -> Option<Choice> {
         if self.row.light_count == 0 {
             return None;
         }
@@ -66,6 +98,37 @@ impl<'a> Chances<'a> {
             _ => choose_by_tree(self.lights, self.row, self.runs, at, bits),
         }
     }
+}
+
+/// What a guest may give to a receiver.
+fn guest_importance(light: &Light, at: &SurfaceHit) -> f32 {
+    let to = Vec3::from(light.p0) - at.position;
+    if to.dot(at.geometric_normal) + light.size <= 0.0 {
+        return 0.0;
+    }
+    let reach = light.size * light.size;
+    luminance(light.radiance) * reach / to.length_squared().max(reach)
+}
+
+/// A guest in proportion to its importance.
+fn choose_guest(guests: &[Light], at: &SurfaceHit, u: f32) -> Option<Choice> {
+    let sum: f32 = guests.iter().map(|g| guest_importance(g, at)).sum();
+    let mut below = 0.0;
+    let mut chosen = None;
+    for (i, guest) in (0u32..).zip(guests) {
+        let one = guest_importance(guest, at);
+        below += one;
+        if one > 0.0 {
+            chosen = Some(Choice {
+                light: GUEST_LIGHT + i,
+                probability: one / sum,
+            });
+        }
+        if u * sum < below {
+            break;
+        }
+    }
+    chosen
 }
 
 /// An entry of the cell by its bounds, and a light of its range by power.

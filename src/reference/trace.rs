@@ -9,11 +9,13 @@ use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
 use crate::scene::dynamic_geometry::{self, Moved};
 use crate::scene::entity_geometry::Placement;
+use crate::scene::guests::{GUEST_LIGHT, guests};
 use crate::scene::motion::Moment;
 use crate::scene::records::{
-    Instance, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material, NONE, SEEN_BY_SHADOWS,
+    Instance, Light, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material, NONE,
+    SEEN_BY_SHADOWS,
 };
-use glam::{DVec3, Vec3};
+use glam::{Affine3A, DVec3, Mat3, Vec3};
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
 use std::cell::Cell;
@@ -45,6 +47,8 @@ pub struct Tracer {
     pub clock: Clock,
     /// Glossy stages reflect.
     pub glossy: bool,
+    /// Lights beside the map's: [`crate::scene::guests`].
+    pub guests: Vec<Light>,
     /// Light of each triangle, or [`NONE`].
     lights: Arc<Vec<u32>>,
     /// Dynamic vertices at the moment.
@@ -69,10 +73,6 @@ impl Wanted<'_> {
             Self::Next(_, kind) => *kind,
         }
     }
-}
-
-fn moved(scene: &Scene, clock: Clock, eye: Vec3) -> Vec<Moved> {
-    dynamic_geometry::all(&scene.geometry, &scene.materials, &scene.tables.deforms, clock, eye)
 }
 
 fn instances(scene: &Scene, moment: &Moment) -> Vec<Instance> {
@@ -115,6 +115,11 @@ fn transform(rows: &[[f32; 4]; 3], p: Vec3, w: f32) -> Vec3 {
     Vec3::new(row(&rows[0]), row(&rows[1]), row(&rows[2]))
 }
 
+fn affine(rows: &[[f32; 4]; 3]) -> Affine3A {
+    let column = |c: usize| Vec3::new(rows[0][c], rows[1][c], rows[2][c]);
+    Affine3A::from_mat3_translation(Mat3::from_cols(column(0), column(1), column(2)), column(3))
+}
+
 /// Object-space point to world space.
 pub fn point_to_world(instance: &Instance, p: Vec3) -> Vec3 {
     if instance.identity == 1 {
@@ -127,33 +132,51 @@ pub fn point_to_world(instance: &Instance, p: Vec3) -> Vec3 {
 impl Tracer {
     /// Builds the trees of a scene.
     pub fn new(scene: &Scene) -> Self {
+        let instances = instances(scene, &Clock::default().into());
         Self {
             trees: Arc::new(build_cwbvhs(&scene.geometry)),
-            instances: instances(scene, &Clock::default().into()),
             clock: Clock::default(),
             glossy: false,
+            guests: Vec::new(),
             lights: Arc::new(scene.lights.of_triangles(scene.geometry.triangles.len())),
-            moved: moved(scene, Clock::default(), Vec3::ZERO),
+            moved: dynamic_geometry::all(scene, &instances, Clock::default(), Vec3::ZERO),
+            instances,
         }
     }
 
     /// The same scene at another moment, seen by `camera`.
     pub fn at(&self, scene: &Scene, settings: &Settings, camera: &Camera) -> Self {
         let (clock, eye) = (settings.clock, camera.eye.into());
-        let moment = settings.moment(camera);
+        let instances = instances(scene, &settings.moment(camera));
         Self {
             trees: self.trees.clone(),
-            instances: instances(scene, &moment),
             clock,
             glossy: settings.reflects(),
+            guests: guests(&self.guests, camera, settings.flashlight),
             lights: self.lights.clone(),
-            moved: moved(scene, clock, eye),
+            moved: dynamic_geometry::all(scene, &instances, clock, eye),
+            instances,
         }
     }
 
     /// Number of the light that a triangle is.
     pub fn light_of(&self, triangle: u32) -> Option<u32> {
         Some(self.lights[triangle as usize]).filter(|l| *l != NONE)
+    }
+
+    /// A light where it is at the moment.
+    pub fn light(&self, scene: &Scene, number: u32) -> Light {
+        if let Some(guest) = number.checked_sub(GUEST_LIGHT) {
+            return self.guests[guest as usize];
+        }
+        let light = scene.lights.lights[number as usize];
+        match self.instances.get(light.instance as usize) {
+            None => light,
+            Some(now) => {
+                let start = scene.placements[light.instance as usize].pose(Clock::default());
+                light.moved(affine(&now.object_to_world) * start.inverse())
+            }
+        }
     }
 
     fn vertex(&self, scene: &Scene, vertex: u32) -> Option<&Moved> {

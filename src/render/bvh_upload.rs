@@ -68,7 +68,7 @@ pub struct MeshTrees {
     /// (min, reference) (max, 0) of both children.
     pub bvh2_nodes: Vec<[f32; 16]>,
     pub bvh2_triangles: Vec<[f32; 12]>,
-    /// Where the triangles of the dynamic mesh are in both.
+    /// Where the triangles of the dynamic meshes are in both.
     pub dynamic: Vec<DynamicTriangle>,
 }
 
@@ -207,7 +207,7 @@ impl MeshTrees {
                 out.cwbvh_nodes.push([0; 20]);
                 out.bvh2_triangles.push([0.0; 12]);
             }
-            if !geometry.dynamic.rest.is_empty() && index == geometry.dynamic.mesh as usize {
+            if geometry.dynamic.part(index).is_some() {
                 let mut places = vec![[0u32; 2]; mesh.triangle_count as usize];
                 for (at, i) in b.cwbvh.primitive_indices.iter().enumerate() {
                     places[*i as usize][0] = (out.cwbvh_triangles.len() + at) as u32;
@@ -220,7 +220,7 @@ impl MeshTrees {
                     cwbvh,
                     bvh2,
                 };
-                out.dynamic = (0u32..).zip(places).map(place).collect();
+                out.dynamic.extend((0u32..).zip(places).map(place));
             }
             let pack = |i: &u32| packed_triangle(scene, mesh.first_triangle + i);
             out.cwbvh_triangles.extend(b.cwbvh.primitive_indices.iter().map(pack));

@@ -1,4 +1,4 @@
-//! Deform stage: dynamic triangles where the clock has them. Nothing is uploaded; the driver's structure over them is refitted.
+//! Deform stage: dynamic triangles where the clock has them. Nothing is uploaded; the driver's structures over them are refitted.
 //! Shader: `shaders/deform.comp`.
 
 use super::pass::{Pass, PassContext, Recorder};
@@ -35,22 +35,23 @@ impl Deform {
         let written: Vec<_> = moved.iter().map(|b| Use::buffer(b, Access::ComputeReadWrite)).collect();
         self.0
             .record(r, &written, [scene.dynamic_triangles_count.div_ceil(GROUP), 1, 1])?;
-        if let Some(driver) = &scene.driver
-            && let Some(refit) = &driver.refit
-            && let Some(level) = driver.bottom(refit.mesh)
-        {
-            let uses = [
-                Use::buffer(&scene.positions, Access::BuildInput),
-                Use::resource(level.id(), Access::BuildWrite),
-            ];
+        if let Some(driver) = &scene.driver {
+            let refits = || driver.refits.iter().filter_map(|r| Some((r, driver.bottom(r.mesh)?)));
+            let mut uses = vec![Use::buffer(&scene.positions, Access::BuildInput)];
+            uses.extend(refits().map(|(_, level)| Use::resource(level.id(), Access::BuildWrite)));
             r.tracker.pass(r.cmd, &uses)?;
-            let refits = [Refit {
-                bottom: level,
-                geometries: &refit.geometries,
-                rebuild: false,
-            }];
-            BottomLevel::record_refits(r.cmd, &refits, &refit.scratch)?;
-            r.tracker.pass(r.cmd, &[Use::resource(level.id(), Access::BuildRead)])?;
+            for (refit, level) in refits() {
+                let one = Refit {
+                    bottom: level,
+                    geometries: &refit.geometries,
+                    rebuild: false,
+                };
+                BottomLevel::record_refits(r.cmd, &[one], &refit.scratch)?;
+            }
+            let built: Vec<_> = refits()
+                .map(|(_, level)| Use::resource(level.id(), Access::BuildRead))
+                .collect();
+            r.tracker.pass(r.cmd, &built)?;
         }
         // What follows reads all of it without saying so: scenes are still otherwise.
         let read: Vec<_> = moved.iter().map(|b| Use::buffer(b, Access::ComputeRead)).collect();

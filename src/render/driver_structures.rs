@@ -16,11 +16,11 @@ pub struct DriverStructures {
     bottom: Vec<Option<BottomLevel>>,
     pub top: TopLevel,
     pub statistics: BuildStatistics,
-    /// The dynamic mesh, where there is one.
-    pub refit: Option<DynamicRefit>,
+    /// Of the dynamic meshes.
+    pub refits: Vec<DynamicRefit>,
 }
 
-/// What refits the driver's structure over the dynamic mesh.
+/// What refits the driver's structure over a dynamic mesh.
 pub struct DynamicRefit {
     pub mesh: u32,
     pub geometries: Vec<TriangleGeometry>,
@@ -96,7 +96,7 @@ pub fn build(
         .iter()
         .zip(&used)
         .map(|(geometries, &mesh)| {
-            let moves = !g.dynamic.rest.is_empty() && mesh == g.dynamic.mesh as usize;
+            let moves = g.dynamic.part(mesh).is_some();
             BottomDesc {
                 name: "mesh",
                 geometries,
@@ -108,15 +108,15 @@ pub fn build(
         .collect();
     let (bottom, statistics) = BottomLevel::build(device, &descriptions)?;
     let mut levels: Vec<Option<BottomLevel>> = (0..g.meshes.len()).map(|_| None).collect();
-    let mut refit = None;
+    let mut refits = Vec::new();
     for ((mesh, level), geometries) in used.into_iter().zip(bottom).zip(&geometries) {
-        if !g.dynamic.rest.is_empty() && mesh == g.dynamic.mesh as usize {
+        if g.dynamic.part(mesh).is_some() {
             let one = Refit {
                 bottom: &level,
                 geometries,
                 rebuild: false,
             };
-            refit = Some(DynamicRefit {
+            refits.push(DynamicRefit {
                 mesh: mesh as u32,
                 scratch: Scratch::new(device, BottomLevel::refit_scratch_bytes(device, &[one]))?,
                 geometries: geometries.clone(),
@@ -135,6 +135,6 @@ pub fn build(
         bottom: levels,
         top,
         statistics,
-        refit,
+        refits,
     })
 }

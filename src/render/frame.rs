@@ -24,6 +24,8 @@ use super::tone_map::ToneMap;
 use super::view_state::ViewState;
 use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps};
 use crate::scene::camera::Camera;
+use crate::scene::guests::guests;
+use crate::scene::records::Light;
 use std::sync::Arc;
 
 /// In frames that are shown as they come, a branch of less than this share of what the eye sees is followed in proportion to
@@ -32,9 +34,11 @@ const LEAST_BRANCH_SHARE: f32 = 0.25;
 
 /// What a frame shows and how.
 #[derive(Clone, Copy, Debug)]
-pub struct FrameInput {
+pub struct FrameInput<'a> {
     pub camera: Camera,
     pub settings: Settings,
+    /// Lights that are in this frame beside the map's: [`crate::scene::guests`]. World space; any number.
+    pub lights: &'a [Light],
     /// Number of the sample that every pixel takes.
     pub sample_index: u32,
     /// Samples accumulated with this one; 0 shows this frame alone.
@@ -48,7 +52,7 @@ pub struct FrameInput {
     pub output: bool,
 }
 
-impl FrameInput {
+impl FrameInput<'_> {
     /// Whether the frame is denoised: averaged frames never are.
     pub fn denoises(&self) -> bool {
         self.settings.denoiser && self.settings.illumination && self.accumulated == 0
@@ -129,12 +133,15 @@ impl FrameRenderer {
         scene: &SceneGpu,
         view: &mut ViewState,
         slot: usize,
-        input: &FrameInput,
+        input: &FrameInput<'_>,
     ) -> Result<(), GpuError> {
         view.gbuffer.parity ^= 1;
         view.anti_aliased = input.anti_aliases();
         let constants = frame_constants(scene, view, slot, input)?;
-        let mut constants = view.history.advance(constants, input, scene.revision(), scene.moving);
+        let mut constants = {
+            let revision = scene.revision().wrapping_add(view.guests.revision);
+            view.history.advance(constants, input, revision, scene.moving)
+        };
         if scene.moving.geometry {
             let moving = match view.moving.take() {
                 Some(made) => made,
@@ -231,18 +238,23 @@ fn frame_constants(
     scene: &SceneGpu,
     view: &mut ViewState,
     slot: usize,
-    input: &FrameInput,
+    input: &FrameInput<'_>,
 ) -> Result<FrameConstants, GpuError> {
     let s = &input.settings;
     if s.focus_distance > 0.0 {
         view.focus[slot].write(0, &[s.focus_distance])?;
     }
     let size = view.gbuffer.size;
+    let guests = guests(input.lights, &input.camera, s.flashlight);
+    let guest_lights = view.guests.write(&scene.device, slot, &guests)?;
     let lists = if s.cull_lights == 2 { &scene.tight } else { &scene.pvs };
     let base = scene.constants(&input.camera, size);
     Ok(FrameConstants {
         light_rows: lists.rows.address(),
         light_runs: lists.runs.address(),
+        guest_lights,
+        guest_count: guests.len() as u32,
+        draw_sun: u32::from(s.draw_sun),
         counters: view.counters[slot].address(),
         exposure: view.exposure.address(),
         focus: view.focus[slot].address(),

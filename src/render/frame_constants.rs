@@ -21,6 +21,8 @@ pub struct FrameConstants {
     pub dynamic_triangles: u64,
     pub instances: u64,
     pub lights: u64,
+    /// The frame's own lights.
+    pub guest_lights: u64,
     pub bsp_nodes: u64,
     pub light_rows: u64,
     pub light_runs: u64,
@@ -154,6 +156,9 @@ pub struct FrameConstants {
     pub branches_off: u32,
     /// A branch of less than this share is followed now and then; 0: always.
     pub branch_share: f32,
+    pub guest_count: u32,
+    /// Suns are seen.
+    pub draw_sun: u32,
 }
 
 /// Push constants of every pass.

@@ -87,6 +87,7 @@ impl<'a> GpuRenderer<'a> {
         let input = FrameInput {
             camera: *camera,
             settings: *settings,
+            lights: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -16,6 +16,7 @@ pub mod gbuffer;
 pub mod gpu_renderer;
 pub mod gradient;
 pub mod gradient_atrous;
+pub mod guests;
 pub mod history;
 pub mod moving;
 pub mod pass;

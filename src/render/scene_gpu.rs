@@ -139,6 +139,14 @@ fn upload<T: bytemuck::NoUninit>(
     Buffer::new(device, name, size, usage, MemoryKind::DeviceLocal)
 }
 
+/// A light in the space of what carries it.
+fn carried(light: &Light, placements: &[Placement]) -> Light {
+    match placements.get(light.instance as usize) {
+        Some(carrier) => light.moved(carrier.pose(Clock::default()).inverse()),
+        None => *light,
+    }
+}
+
 struct Uploads {
     staging: Vec<(Vec<u8>, usize)>,
 }
@@ -209,7 +217,13 @@ impl SceneGpu {
         let rest_vertices = buffer!("rest vertices", &g.dynamic.rest, none);
         let dynamic_triangles = buffer!("dynamic triangles", &trees.dynamic, none);
         let instance_records = buffer!("instances", &instances, none);
-        let lights = buffer!("lights", &scene.lights.lights, none);
+        let carried: Vec<Light> = scene
+            .lights
+            .lights
+            .iter()
+            .map(|l| carried(l, &scene.placements))
+            .collect();
+        let lights = buffer!("lights", &carried, none);
         let light_nodes = buffer!("light nodes", &scene.lights.tree.nodes, none);
         let light_weights = buffer!("light weights", &scene.lights.weights, none);
         let of_triangles = scene.lights.of_triangles(g.triangles.len());
@@ -312,7 +326,8 @@ impl SceneGpu {
             first_dynamic_vertex: g.dynamic.vertices.start,
             moving: Moving {
                 picture: scene.material_sources.iter().any(|m| m.program.animated),
-                lights: scene.material_sources.iter().any(|m| m.program.moving_emission),
+                lights: scene.material_sources.iter().any(|m| m.program.moving_emission)
+                    || scene.lights.lights.iter().any(|l| l.instance != NONE),
                 geometry: scene.placements.iter().any(|p| p.motion.moves()) || !trees.dynamic.is_empty(),
             },
             has_player: scene
@@ -384,7 +399,8 @@ impl SceneGpu {
     /// [`GpuError`], where they do not fit above all.
     pub fn update_lights(&self, first: usize, lights: &[Light]) -> Result<(), GpuError> {
         let mut batch = UploadBatch::new(&self.device, STAGING)?;
-        batch.buffer(&self.lights, (first * size_of::<Light>()) as u64, lights)?;
+        let lights: Vec<Light> = lights.iter().map(|l| carried(l, &self.placements)).collect();
+        batch.buffer(&self.lights, (first * size_of::<Light>()) as u64, &lights)?;
         batch.finish()?;
         self.revision.fetch_add(1, Ordering::Relaxed);
         Ok(())

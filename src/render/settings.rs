@@ -125,6 +125,12 @@ pub struct Settings {
     pub choose_layers: bool,
     /// Draw the weapon before the eye, where the scene has a player.
     pub draw_gun: bool,
+    /// Levels by which models have less detail than their size calls for.
+    pub lod_bias: i32,
+    /// Brightness of the lamp that the player holds, as of a light entity; 0: off.
+    pub flashlight: f32,
+    /// Show the discs of suns.
+    pub draw_sun: bool,
     /// The scene's time; where the shutter is open longer, when it opens.
     pub clock: Clock,
     /// How long the shutter is open for samples that are averaged, seconds.
@@ -165,6 +171,7 @@ impl Settings {
             clock: self.clock,
             camera: *camera,
             draw_gun: self.draw_gun,
+            lod_bias: Some(self.lod_bias),
         }
     }
 
@@ -246,6 +253,9 @@ impl Default for Settings {
             glossy: true,
             choose_layers: true,
             draw_gun: true,
+            lod_bias: 0,
+            flashlight: 0.0,
+            draw_sun: false,
             clock: Clock::default(),
             shutter: 0.0,
         }

@@ -2,6 +2,7 @@
 
 use super::frame_constants::FrameConstants;
 use super::gbuffer::GBuffer;
+use super::guests::Guests;
 use super::history::FrameHistory;
 use super::moving::Moving;
 use super::reservoirs::Reservoirs;
@@ -31,6 +32,7 @@ pub struct ViewState {
     /// Made when a frame first shows a scene where something branches off.
     pub secondary_pixels: Option<SecondaryPixels>,
     pub strata: Strata,
+    pub guests: Guests,
     pub history: FrameHistory,
     /// Made when a frame first shows a scene in which something moves.
     pub moving: Option<Moving>,
@@ -79,6 +81,7 @@ impl ViewState {
             reservoirs: None,
             secondary_pixels: None,
             strata: Strata::new(device, size)?,
+            guests: Guests::default(),
             history: FrameHistory::default(),
             moving: None,
             anti_aliased: false,

@@ -10,13 +10,11 @@ use obvhs::triangle::Triangle;
 use rayon::prelude::*;
 use std::time::Duration;
 
-/// Boxes that hold the triangles of the dynamic mesh at all times; `None` for other meshes.
+/// Boxes that hold the triangles of a dynamic mesh at all times; `None` for other meshes.
 pub fn swept_boxes(geometry: &Geometry, mesh: usize) -> Option<Vec<Aabb>> {
-    let dynamic = &geometry.dynamic;
-    (!dynamic.rest.is_empty() && mesh == dynamic.mesh as usize).then(|| {
-        let aabb = |[min, max]: &[Vec3; 2]| Aabb::new((*min).into(), (*max).into());
-        dynamic.boxes.iter().map(aabb).collect()
-    })
+    let aabb = |[min, max]: &[Vec3; 2]| Aabb::new((*min).into(), (*max).into());
+    let part = geometry.dynamic.part(mesh)?;
+    Some(part.boxes.iter().map(aabb).collect())
 }
 
 /// Triangles of a mesh in the form that `obvhs` takes.

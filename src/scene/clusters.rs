@@ -6,9 +6,10 @@
 
 use super::records::{BspNode, LightRow, LightRun};
 use crate::assets::bsp::{Bounds, Bsp};
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// How far a receiver is moved along its geometric normal, in turn, until it lies in open space (units).
 pub const NUDGES: [f32; 5] = [0.25, 1.0, 4.0, 8.0, 16.0];
@@ -149,6 +150,20 @@ pub struct LightReach {
     pub clusters: Option<ClusterSet>,
     /// One-sided emitters: nothing on or behind this plane (unit normal, distance) is lit.
     pub front: Option<(Vec3, f32)>,
+    /// Poses of a light that moves, relative to where its record has it; those between lie within the bounds of all. None: it
+    /// stands still.
+    pub sweep: Option<Arc<[Affine3A]>>,
+}
+
+impl LightReach {
+    /// Of a light that stands still.
+    pub fn still(clusters: Option<ClusterSet>, front: Option<(Vec3, f32)>) -> Self {
+        Self {
+            clusters,
+            front,
+            sweep: None,
+        }
+    }
 }
 
 /// Light lists of all rows at one culling level.

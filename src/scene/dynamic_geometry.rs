@@ -1,14 +1,16 @@
-//! World surfaces whose vertices move (`deformVertexes`): the thesis's dynamic world with dynamic data.
+//! Surfaces whose vertices move (`deformVertexes`), of the world (the thesis's dynamic world with dynamic data), of brush models and
+//! of MD3 models.
 //!
 //! Deformations are bounded. The tree over such triangles is built once over boxes that hold them at all times, so that it
 //! never has to be refitted and never gets worse; only the triangles in it are written anew, on the GPU, from the clock. The
 //! driver's structures, which take no boxes of ours, are refitted.
 
+use super::Scene;
 use super::clock::{Clock, rate};
+use super::entity_geometry::Placement;
 use super::program::wave_at;
 use super::program::wave_record;
 use super::records::*;
-use super::static_geometry::Geometry;
 use crate::assets::shader_script::Deform as Script;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -78,14 +80,56 @@ pub fn reach(deforms: &[Deform]) -> f32 {
 /// The dynamic part of a scene's geometry.
 #[derive(Clone, Debug, Default)]
 pub struct Dynamic {
-    /// Mesh that holds it, and nothing else.
-    pub mesh: u32,
-    /// Global vertices.
+    pub parts: Vec<DynamicPart>,
+    /// Global vertices of all parts.
     pub vertices: Range<u32>,
     /// As modelled, one for each of `vertices`.
     pub rest: Vec<RestVertex>,
+}
+
+/// The deforming triangles of one mesh.
+#[derive(Clone, Debug)]
+pub struct DynamicPart {
+    /// Mesh that holds them, and nothing else.
+    pub mesh: u32,
+    /// Mesh that they are a part of: they stand wherever it stands. 0: the world.
+    pub carrier: u32,
+    /// Global vertices.
+    pub vertices: Range<u32>,
     /// Boxes that hold the mesh's triangles at all times.
     pub boxes: Vec<[Vec3; 2]>,
+}
+
+impl Dynamic {
+    /// The part that is mesh number `mesh`.
+    pub fn part(&self, mesh: usize) -> Option<&DynamicPart> {
+        self.parts.iter().find(|p| p.mesh as usize == mesh)
+    }
+
+    /// Mesh that a mesh is a part of, or itself.
+    pub fn carrier(&self, mesh: usize) -> usize {
+        self.part(mesh).map_or(mesh, |p| p.carrier as usize)
+    }
+
+    /// Places parts wherever their carriers are. Sprites of a carrier that stands in several places look at the eye as its first
+    /// one sees it.
+    pub fn place(&mut self, placements: &mut Vec<Placement>) {
+        for part in &self.parts {
+            let first = placements.len() as u32;
+            let carried: Vec<Placement> = placements
+                .iter()
+                .filter(|p| p.mesh == part.carrier && p.steps == 1)
+                .map(|p| Placement {
+                    mesh: part.mesh,
+                    ..p.clone()
+                })
+                .collect();
+            placements.extend(carried);
+            for v in part.vertices.clone() {
+                self.rest[(v - self.vertices.start) as usize].instance = first;
+            }
+        }
+    }
 }
 
 /// The box that holds a triangle at all times and seen from everywhere.
@@ -203,8 +247,16 @@ fn pivoted(v: &Moved, quad: [Vec3; 4], eye: Vec3) -> Moved {
     }
 }
 
-/// All dynamic vertices at a moment, seen from `eye`.
-pub fn all(geometry: &Geometry, materials: &[Material], deforms: &[Deform], clock: Clock, eye: Vec3) -> Vec<Moved> {
+/// A point of the world in the space of an instance that has been moved rigidly.
+fn to_carrier(rows: &[[f32; 4]; 3], p: Vec3) -> Vec3 {
+    let d = p - Vec3::new(rows[0][3], rows[1][3], rows[2][3]);
+    let axis = |c: usize| Vec3::new(rows[0][c], rows[1][c], rows[2][c]).dot(d);
+    Vec3::new(axis(0), axis(1), axis(2))
+}
+
+/// All dynamic vertices at a moment, seen from `eye`, in the spaces of their meshes.
+pub fn all(scene: &Scene, instances: &[Instance], clock: Clock, eye: Vec3) -> Vec<Moved> {
+    let (geometry, materials, deforms) = (&scene.geometry, &scene.materials, &scene.tables.deforms);
     let dynamic = &geometry.dynamic;
     let first = dynamic.vertices.start;
     (0..dynamic.rest.len())
@@ -219,6 +271,8 @@ pub fn all(geometry: &Geometry, materials: &[Material], deforms: &[Deform], cloc
                 NONE => [Vec3::ZERO; 4],
                 q => std::array::from_fn(|k| dynamic.rest[(q - first) as usize + k].position.into()),
             };
+            let carrier = instances.get(rest.instance as usize);
+            let eye = carrier.map_or(eye, |i| to_carrier(&i.object_to_world, eye));
             deformed(own, rest, uv, quad, clock, eye)
         })
         .collect()
@@ -241,6 +295,7 @@ mod tests {
             normal: [1.0, 0.0, 0.0],
             quad: 0,
             material: 0,
+            instance: NONE,
         }
     }
 

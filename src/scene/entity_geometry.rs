@@ -1,6 +1,8 @@
 //! Entities that place geometry: brush models and items.
 
+use super::clock::Clock;
 use super::items::PlacedItem;
+use super::models::Models;
 use super::motion::{Moment, Motion, step};
 use super::player::Part;
 use super::records::{Instance, SEEN_BY_ALL};
@@ -8,6 +10,7 @@ use super::static_geometry::Mesh;
 use crate::assets::bsp::Bsp;
 use crate::assets::entities::Entity;
 use glam::{Affine3A, Vec3};
+use std::sync::Arc;
 
 /// A mesh standing or moving somewhere in the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +23,8 @@ pub struct Placement {
     pub motion: Motion,
     /// Rays that meet it: `SEEN_BY_…`.
     pub seen_by: u32,
+    /// Meshes that it is shown by when it is small, the most detailed first.
+    pub less_detailed: Vec<u32>,
 }
 
 impl Placement {
@@ -31,6 +36,7 @@ impl Placement {
             step_rate: 0,
             motion,
             seen_by: SEEN_BY_ALL,
+            less_detailed: Vec::new(),
         }
     }
 
@@ -42,6 +48,7 @@ impl Placement {
             step_rate: part.rate,
             motion: part.motion,
             seen_by: part.seen_by,
+            less_detailed: Vec::new(),
         }
     }
 }
@@ -69,12 +76,47 @@ pub fn placements(bsp: &Bsp, entities: &[Entity]) -> Vec<Placement> {
     out
 }
 
-/// Where an item's models stand; `meshes` are theirs, `middles` the middles of their boxes.
-pub fn item_placements(item: &PlacedItem, meshes: [Option<u32>; 2], middles: [Vec3; 2]) -> Vec<Placement> {
-    (0..2)
-        .filter_map(|i| Some(Placement::new(meshes[i]?, item.motion(i == 1, middles[i]))))
-        .collect()
+/// Where a mesh stands at the start, and how it moves from there.
+#[derive(Clone, Debug)]
+pub struct Standing {
+    /// Mesh to world.
+    pub pose: Affine3A,
+    /// Of one that moves: its placement, and its poses relative to `pose`.
+    pub mover: Option<(u32, Arc<[Affine3A]>)>,
 }
+
+/// Where each mesh stands first; `None` where no entity places it.
+pub fn standings(placements: &[Placement], meshes: usize) -> Vec<Option<Standing>> {
+    let mut first = vec![None; meshes];
+    for (number, p) in (0u32..).zip(placements) {
+        first[p.mesh as usize].get_or_insert_with(|| {
+            let pose = p.pose(Clock::default());
+            let back = pose.inverse();
+            let sweep = || p.motion.sweep().into_iter().map(|at| at * back).collect();
+            Standing {
+                pose,
+                mover: p.motion.moves().then(|| (number, sweep())),
+            }
+        });
+    }
+    first
+}
+
+/// Where an item's models, which are meshes from `first` on, stand.
+pub fn item_placements(item: &PlacedItem, numbers: [Option<u32>; 2], models: &Models, first: u32) -> Vec<Placement> {
+    let place = |(i, number): (usize, Option<u32>)| {
+        let number = number?;
+        let less_detailed = models.less_detailed(number);
+        Some(Placement {
+            less_detailed: less_detailed.iter().map(|n| first + n).collect(),
+            ..Placement::new(first + number, item.motion(i == 1, models.middle(number)))
+        })
+    };
+    numbers.into_iter().enumerate().filter_map(place).collect()
+}
+
+/// Share of the view's half width that a model's radius fills when it is first shown with less detail.
+const FULL_DETAIL: f32 = 0.2;
 
 /// An affine map as three rows of four.
 pub fn rows(m: Affine3A) -> [[f32; 4]; 3] {
@@ -88,10 +130,29 @@ impl Placement {
         self.motion.pose(moment)
     }
 
+    /// Levels of detail go down evenly from where the model fills [`FULL_DETAIL`] of the view to where it is a point: the
+    /// original's rule. 0 is full detail. All rays of a frame meet the same.
+    fn level_of_detail(&self, meshes: &[Mesh], pose: Affine3A, now: &Moment) -> usize {
+        let levels = self.less_detailed.len() + 1;
+        let Some(bias) = now.lod_bias.filter(|_| levels > 1) else {
+            return 0;
+        };
+        let bounds = meshes[self.mesh as usize].bounds;
+        let radius = bounds.min.abs().max(bounds.max.abs()).length();
+        let distance = Vec3::from(pose.translation).distance(now.camera.eye.into());
+        let half_width = distance * (now.camera.fov.to_radians() * 0.5).tan();
+        let small = 1.0 - radius / (FULL_DETAIL * half_width).max(f32::MIN_POSITIVE);
+        let level = (small.max(0.0) * levels as f32) as i32 + bias;
+        level.clamp(0, levels as i32 - 1) as usize
+    }
+
     /// The record that tracers read. `before`: the moment of the frame before.
     pub fn record(&self, meshes: &[Mesh], now: &Moment, before: &Moment) -> Instance {
         let pose = self.pose(*now);
-        let mesh = self.mesh + step(now.clock, self.step_rate, self.steps);
+        let mesh = match self.level_of_detail(meshes, pose, now) {
+            0 => self.mesh + step(now.clock, self.step_rate, self.steps),
+            level => self.less_detailed[level - 1],
+        };
         let hidden = matches!(self.motion, Motion::View(_)) && !now.draw_gun;
         Instance {
             object_to_world: rows(pose),

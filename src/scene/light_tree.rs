@@ -8,7 +8,7 @@
 use super::light_power::strength;
 use super::records::{LIGHT_DOME, LIGHT_SPHERE, LIGHT_SUN, LIGHT_TRIANGLE, LIGHT_TWO_SIDED, Light, LightNode};
 use crate::assets::bsp::Bounds;
-use glam::Vec3;
+use glam::{Affine3A, BVec3, Vec3};
 use std::f32::consts::{FRAC_PI_2, PI};
 
 /// The tree, and the order of lights that it wants.
@@ -22,6 +22,9 @@ pub struct LightTree {
 
 /// Half angle of a cone whose normals count as one, radians.
 const ONE_WAY: f32 = 1e-4;
+/// What lies between two poses of a sweep is this share of its bounds outside at most, and faces so many radians elsewhere.
+const SWEEP_SLACK: f32 = 0.01;
+const SWEEP_TURN: f32 = 0.1;
 /// Bins per axis for the choice of a split.
 const BINS: usize = 16;
 
@@ -88,6 +91,21 @@ struct Item {
     bounds: Bounds,
     cone: Cone,
     strength: f32,
+    moves: bool,
+}
+
+impl Item {
+    /// Least product of an axis with a point of the light, wherever it goes.
+    fn lowest(&self, axis: Vec3) -> f32 {
+        if self.moves {
+            let b = self.bounds;
+            return axis.dot(Vec3::select(axis.cmpgt(Vec3::ZERO), b.min, b.max));
+        }
+        self.corners
+            .into_iter()
+            .map(|p| axis.dot(p))
+            .fold(f32::INFINITY, f32::min)
+    }
 }
 
 /// Sums over a set of items.
@@ -140,7 +158,8 @@ impl Group {
     }
 }
 
-fn item(index: u32, light: &Light) -> Item {
+/// `sweep`: poses of a light that moves, relative to its record.
+fn item(index: u32, light: &Light, sweep: Option<&[Affine3A]>) -> Item {
     let p0 = Vec3::from(light.p0);
     let (e1, e2) = (Vec3::from(light.p1), Vec3::from(light.p2));
     let mut bounds = Bounds::EMPTY;
@@ -165,23 +184,44 @@ fn item(index: u32, light: &Light) -> Item {
             cone = Cone { axis, angle: 0.0 };
         }
     }
+    if let Some(poses) = sweep {
+        let (rest, facing) = (bounds, cone);
+        (bounds, cone) = (Bounds::EMPTY, Cone::EMPTY);
+        for pose in poses {
+            for corner in 0..8u32 {
+                let upper = BVec3::new(corner & 1 != 0, corner & 2 != 0, corner & 4 != 0);
+                bounds.include(pose.transform_point3(Vec3::select(upper, rest.max, rest.min)));
+            }
+            cone = cone.union(Cone {
+                axis: pose.transform_vector3(facing.axis).normalize_or(facing.axis),
+                angle: facing.angle,
+            });
+        }
+        bounds = bounds.grown((bounds.max - bounds.min).max_element() * SWEEP_SLACK);
+        // Ways to face between two poses.
+        if cone.angle > ONE_WAY {
+            cone.angle = (cone.angle + SWEEP_TURN).min(PI);
+        }
+    }
     Item {
         index,
         corners,
         bounds,
         cone,
         strength: strength(light),
+        moves: sweep.is_some(),
     }
 }
 
 impl LightTree {
-    /// Builds the tree; the second value is the order: at place i, the number that the light had before.
-    pub fn build(lights: &[Light]) -> (Self, Vec<u32>) {
+    /// Builds the tree; the second value is the order: at place i, the number that the light had before. `sweeps`: of each
+    /// light, its poses if it moves.
+    pub fn build(lights: &[Light], sweeps: &[Option<&[Affine3A]>]) -> (Self, Vec<u32>) {
         let finite = |l: &&Light| matches!(l.kind, LIGHT_TRIANGLE | LIGHT_SPHERE | LIGHT_DOME);
         let mut items: Vec<Item> = (0u32..)
             .zip(lights)
             .filter(|(_, l)| finite(l))
-            .map(|(i, l)| item(i, l))
+            .map(|(i, l)| item(i, l, sweeps[i as usize]))
             .collect();
         let mut nodes = Vec::with_capacity((2 * items.len()).saturating_sub(1));
         if !items.is_empty() {
@@ -207,14 +247,9 @@ fn split(items: &mut [Item], first: u32, nodes: &mut Vec<LightNode>) {
     // A little more than the bounds, so that rounding leaves nothing outside.
     let slack = 1e-3 + (centre.abs().max_element() + half.max_element()) * 2e-6;
     let axis = group.cone.axis;
-    let along = |p: Vec3| axis.dot(p);
     let front = if group.cone.angle <= ONE_WAY {
         // Normals that differ a little tilt the emitters' planes a little.
-        let lowest = items
-            .iter()
-            .flat_map(|i| i.corners)
-            .map(along)
-            .fold(f32::INFINITY, f32::min);
+        let lowest = items.iter().map(|i| i.lowest(axis)).fold(f32::INFINITY, f32::min);
         lowest - slack - 2.0 * half.length() * ONE_WAY
     } else {
         f32::MIN
@@ -331,7 +366,7 @@ mod tests {
     #[test]
     fn nodes_bound_their_lights() {
         let lights = triangles(500);
-        let (tree, order) = LightTree::build(&lights);
+        let (tree, order) = LightTree::build(&lights, &[None; 500]);
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert!(sorted.iter().copied().eq(0..500));
@@ -342,7 +377,7 @@ mod tests {
         for (at, node) in tree.nodes.iter().enumerate() {
             for i in node.first..node.first + node.count {
                 let light = &lights[order[i as usize] as usize];
-                let item = item(0, light);
+                let item = item(0, light, None);
                 let corners = [item.bounds.min, item.bounds.max];
                 for c in corners {
                     let off = (c - Vec3::from(node.centre)).abs();
@@ -373,8 +408,8 @@ mod tests {
     #[test]
     fn lights_in_one_place_and_none_at_all() {
         let one = triangles(1)[0];
-        let (tree, order) = LightTree::build(&[one; 33]);
+        let (tree, order) = LightTree::build(&[one; 33], &[None; 33]);
         assert_eq!((tree.nodes.len(), order.len()), (65, 33));
-        assert_eq!(LightTree::build(&[]), (LightTree::default(), Vec::new()));
+        assert_eq!(LightTree::build(&[], &[]), (LightTree::default(), Vec::new()));
     }
 }

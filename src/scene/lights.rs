@@ -1,6 +1,7 @@
 //! The lights that a map's files describe: emissive surfaces, light entities, suns and skies, in luxel units.
 
 use super::clusters::{ClusterMap, ClusterSet, LightReach};
+use super::entity_geometry::Standing;
 use super::light_power::{strength_of_one, weight_sums};
 use super::light_tree::LightTree;
 use super::material::{MaterialSource, Visibility};
@@ -14,6 +15,7 @@ use crate::assets::entities::Entity;
 use crate::assets::shader_script::Sun;
 use glam::{Affine3A, Vec3};
 use std::f32::consts::PI;
+use std::ops::Range;
 
 /// A point light of N has luxel value 7500·N·cosθ/d².
 const POINT_SCALE: f32 = 7500.0;
@@ -72,13 +74,27 @@ const BLANK: Light = Light {
     scale: 1.0,
 };
 
+/// The sphere that stands for a point light of a map.
+pub fn point_light(centre: Vec3, photons: f32, colour: Vec3) -> Light {
+    // Irradiance/π of a sphere of radiance L at distance d is L·r²/d²; it is 7500·N/(255·d²).
+    let radiance = colour * (POINT_SCALE * photons / 255.0 / (POINT_RADIUS * POINT_RADIUS));
+    Light {
+        kind: LIGHT_SPHERE,
+        p0: centre.into(),
+        size: POINT_RADIUS,
+        p2: [0.0, 0.0, photons / 255.0],
+        radiance: radiance.into(),
+        ..BLANK
+    }
+}
+
 /// Everything that the collection of lights looks at.
 pub struct LightInputs<'a> {
     pub bsp: &'a Bsp,
     pub entities: &'a [Entity],
     pub geometry: &'a Geometry,
-    /// Object to world of each mesh, `None` where no entity places it.
-    pub placements: &'a [Option<Affine3A>],
+    /// Where each mesh stands, `None` where no entity places it.
+    pub standings: &'a [Option<Standing>],
     pub sources: &'a [MaterialSource],
     pub materials: &'a [Material],
     pub clusters: &'a ClusterMap,
@@ -87,10 +103,9 @@ pub struct LightInputs<'a> {
 impl LightInputs<'_> {
     /// The map's own meshes, with their numbers: models of items light nothing.
     fn map_meshes(&self) -> impl Iterator<Item = (usize, &Mesh)> {
-        let dynamic = self.geometry.dynamic.mesh as usize;
         let own = self.bsp.models.len();
         let meshes = self.geometry.meshes.iter().enumerate();
-        meshes.filter(move |(i, _)| *i < own || (dynamic != 0 && *i == dynamic))
+        meshes.filter(move |(i, _)| self.geometry.dynamic.carrier(*i) < own)
     }
 }
 
@@ -122,14 +137,18 @@ impl LightTable {
     pub fn collect(inputs: &LightInputs) -> Self {
         let mut table = Self::default();
         for (index, mesh) in inputs.map_meshes() {
-            let Some(placement) = inputs.placements[index] else {
+            let Some(standing) = &inputs.standings[index] else {
                 continue;
             };
             let range = mesh.first_triangle..mesh.first_triangle + mesh.triangle_count;
-            table.add_triangles(inputs, range, placement, index != 0 && index < inputs.bsp.models.len());
+            table.add_triangles(inputs, range, standing, inputs.geometry.dynamic.carrier(index) != 0);
         }
         let rest = inputs.geometry.untraced_from..inputs.geometry.triangles.len() as u32;
-        table.add_triangles(inputs, rest, Affine3A::IDENTITY, false);
+        let world = Standing {
+            pose: Affine3A::IDENTITY,
+            mover: None,
+        };
+        table.add_triangles(inputs, rest, &world, false);
         for entity in inputs.entities.iter().filter(|e| is_light(e)) {
             table.add_entity(inputs, entity);
         }
@@ -167,7 +186,8 @@ impl LightTable {
 
     /// Builds the tree and the weights, and brings the lights into the tree's order.
     pub fn put_in_order(&mut self) {
-        let (tree, order) = LightTree::build(&self.lights);
+        let sweeps: Vec<_> = self.reach.iter().map(|r| r.sweep.as_deref()).collect();
+        let (tree, order) = LightTree::build(&self.lights, &sweeps);
         self.lights = order.iter().map(|&i| self.lights[i as usize]).collect();
         self.sources = order.iter().map(|&i| self.sources[i as usize]).collect();
         self.reach = order.iter().map(|&i| self.reach[i as usize].clone()).collect();
@@ -176,7 +196,10 @@ impl LightTable {
         self.tree = tree;
     }
 
-    fn add_triangles(&mut self, inputs: &LightInputs, range: std::ops::Range<u32>, placement: Affine3A, moves: bool) {
+    fn add_triangles(&mut self, inputs: &LightInputs, range: Range<u32>, standing: &Standing, of_entity: bool) {
+        let placement = standing.pose;
+        let instance = standing.mover.as_ref().map_or(NONE, |(number, _)| *number);
+        let sweep = standing.mover.as_ref().map(|(_, poses)| poses.clone());
         let mut sprite_done = u32::MAX;
         for index in range.clone() {
             let triangle = inputs.geometry.triangles[index as usize];
@@ -186,7 +209,7 @@ impl LightTable {
             if source.autosprite {
                 if sprite_done != triangle.surface {
                     sprite_done = triangle.surface;
-                    self.add_sprite(inputs, triangle.surface, range.clone(), placement);
+                    self.add_sprite(inputs, triangle.surface, range.clone(), standing);
                 }
                 continue;
             }
@@ -199,8 +222,14 @@ impl LightTable {
             let sky = source.visibility == Visibility::Sky;
             let two_sided = material.flags & MATERIAL_TWO_SIDED_EMISSION != 0 && !sky;
             let normal = cross / (2.0 * area);
-            let clusters = clusters_of_triangle(inputs, [a, b, c], triangle.surface, moves);
+            let clusters = match &sweep {
+                Some(poses) => inputs
+                    .clusters
+                    .in_box(inputs.bsp, swept_bounds(&[a, b, c], poses).grown(1.0)),
+                None => clusters_of_triangle(inputs, [a, b, c], triangle.surface, of_entity),
+            };
             let clusters = Some(clusters).filter(|set| !set.is_empty());
+            let front = !two_sided && sweep.is_none();
             self.push(
                 if sky {
                     LightSource::SkyTriangle
@@ -214,20 +243,22 @@ impl LightTable {
                     p0: a.into(),
                     size: area,
                     p1: (b - a).into(),
+                    instance,
                     p2: (c - a).into(),
                     radiance: material.emission,
                     ..BLANK
                 },
                 LightReach {
                     clusters,
-                    front: (!two_sided).then(|| (normal, normal.dot(a))),
+                    front: front.then(|| (normal, normal.dot(a))),
+                    sweep: sweep.clone(),
                 },
             );
         }
     }
 
     /// An emissive sprite is a point light at the middle of its surface.
-    fn add_sprite(&mut self, inputs: &LightInputs, surface: u32, range: std::ops::Range<u32>, placement: Affine3A) {
+    fn add_sprite(&mut self, inputs: &LightInputs, surface: u32, range: Range<u32>, standing: &Standing) {
         let mut bounds = Bounds::EMPTY;
         let mut material = 0;
         for index in range {
@@ -243,9 +274,18 @@ impl LightTable {
         }
         let source = &inputs.sources[material as usize];
         let Some(value) = source.surface_light() else { return };
-        let centre = placement.transform_point3(bounds.centre());
+        let centre = standing.pose.transform_point3(bounds.centre());
         let colour = source.emission_colour();
-        self.add_sphere(inputs, LightSource::EmissiveSprite, centre, value, colour, |_| {});
+        let mover = standing.mover.as_ref();
+        self.add_sphere(inputs, LightSource::EmissiveSprite, centre, value, colour, |light| {
+            light.instance = mover.map_or(NONE, |(number, _)| *number);
+        });
+        if let (Some((_, poses)), Some(reach)) = (mover, self.reach.last_mut()) {
+            let around = swept_bounds(&[centre], poses).grown(POINT_RADIUS);
+            let clusters = inputs.clusters.in_box(inputs.bsp, around);
+            reach.clusters = Some(clusters).filter(|set| !set.is_empty());
+            reach.sweep = Some(poses.clone());
+        }
     }
 
     fn add_sphere(
@@ -257,16 +297,7 @@ impl LightTable {
         colour: Vec3,
         shape: impl FnOnce(&mut Light),
     ) {
-        // Irradiance/π of a sphere of radiance L at distance d is L·r²/d²; it is 7500·N/(255·d²).
-        let radiance = colour * (POINT_SCALE * photons / 255.0 / (POINT_RADIUS * POINT_RADIUS));
-        let mut light = Light {
-            kind: LIGHT_SPHERE,
-            p0: centre.into(),
-            size: POINT_RADIUS,
-            p2: [0.0, 0.0, photons / 255.0],
-            radiance: radiance.into(),
-            ..BLANK
-        };
+        let mut light = point_light(centre, photons, colour);
         shape(&mut light);
         if light.flags & LIGHT_LINEAR != 0 {
             light.radiance = colour.into();
@@ -280,7 +311,7 @@ impl LightTable {
             .bsp
             .cluster_at(centre)
             .map(|_| inputs.clusters.in_box(inputs.bsp, around));
-        self.push(source, light, LightReach { clusters, front: None });
+        self.push(source, light, LightReach::still(clusters, None));
     }
 
     fn add_entity(&mut self, inputs: &LightInputs, entity: &Entity) {
@@ -347,10 +378,7 @@ impl LightTable {
                 radiance: sun.irradiance.into(),
                 ..BLANK
             },
-            LightReach {
-                clusters: openings.cloned(),
-                front: None,
-            },
+            LightReach::still(openings.cloned(), None),
         );
     }
 
@@ -413,10 +441,7 @@ impl LightTable {
                 radiance: dome.radiance.into(),
                 ..BLANK
             },
-            LightReach {
-                clusters: Some(clusters).filter(|set| !set.is_empty()),
-                front: None,
-            },
+            LightReach::still(Some(clusters).filter(|set| !set.is_empty()), None),
         );
     }
 }
@@ -426,6 +451,15 @@ struct Dome {
     source: LightSource,
     radiance: Vec3,
     flags: u32,
+}
+
+/// Bounds of points in all poses of a sweep, and of what lies between these.
+fn swept_bounds(points: &[Vec3], poses: &[Affine3A]) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    for pose in poses {
+        points.iter().for_each(|p| bounds.include(pose.transform_point3(*p)));
+    }
+    bounds.grown((bounds.max - bounds.min).max_element() * 0.01)
 }
 
 /// Clusters that a placed triangle touches; of a mover, those around it.
@@ -445,14 +479,14 @@ fn clusters_of_triangle(inputs: &LightInputs, corners: [Vec3; 3], surface: u32, 
 /// Calls with the corners, surface and whether it may move of every traced triangle of a sky.
 fn for_sky_triangles(inputs: &LightInputs, mut found: impl FnMut([Vec3; 3], u32, bool)) {
     for (index, mesh) in inputs.map_meshes() {
-        let Some(placement) = inputs.placements[index] else {
+        let Some(Standing { pose, .. }) = &inputs.standings[index] else {
             continue;
         };
         for t in mesh.first_triangle..mesh.first_triangle + mesh.triangle_count {
             let triangle = inputs.geometry.triangles[t as usize];
             if inputs.sources[triangle.material as usize].visibility == Visibility::Sky {
-                let corners = inputs.geometry.corners(t).map(|p| placement.transform_point3(p));
-                found(corners, triangle.surface, index != 0 && index < inputs.bsp.models.len());
+                let corners = inputs.geometry.corners(t).map(|p| pose.transform_point3(p));
+                found(corners, triangle.surface, inputs.geometry.dynamic.carrier(index) != 0);
             }
         }
     }

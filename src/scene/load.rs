@@ -1,16 +1,14 @@
 //! From a map's files to a scene.
 
 use super::ambient::Ambient;
-use super::clock::Clock;
 use super::clusters::{ClusterMap, LightRows, bsp_records, build_light_rows};
-use super::entity_geometry::{self, Placement};
+use super::entity_geometry::{self, Placement, Standing};
 use super::fog::Fogs;
 use super::items;
 use super::light_cells::LightCells;
 use super::lights::{LightInputs, LightTable};
 use super::material::{MaterialSource, Tables};
 use super::models::Models;
-use super::motion::Motion;
 use super::player::{self, Player, Shelf};
 use super::portals;
 use super::records::{BspNode, Material, Portal};
@@ -23,7 +21,6 @@ use crate::assets::image::Texture;
 use crate::assets::shader_script::ShaderLibrary;
 use crate::assets::vfs::search_path::map_path;
 use crate::assets::vfs::{FileSource, VfsError};
-use glam::{Affine3A, Vec3};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -208,29 +205,24 @@ impl Scene {
             warnings.push("the map has no world model: nothing is drawn".to_owned());
         }
         let mut placements = entity_geometry::placements(&bsp, &entities);
-        if !geometry.dynamic.rest.is_empty() {
-            let motion = Motion::Still(Affine3A::IDENTITY);
-            placements.push(Placement::new(geometry.dynamic.mesh, motion));
-        }
         let first_model = bsp.models.len() as u32;
         for (item, numbers) in items.iter().zip(item_models) {
-            let middles = numbers.map(|n| n.map_or(Vec3::ZERO, |n| models.middle(n)));
-            let meshes = numbers.map(|n| n.map(|n| n + first_model));
-            placements.extend(entity_geometry::item_placements(item, meshes, middles));
+            placements.extend(entity_geometry::item_placements(item, numbers, &models, first_model));
         }
         placements.extend(player.into_iter().map(|part| Placement::of_player(part, first_model)));
+        geometry.dynamic.place(&mut placements);
         watch.lap("geometry");
         let worldspawn = entities.iter().find(|e| e.class() == "worldspawn");
         let far_plane = worldspawn
             .and_then(|w| w.number("_farplanedist"))
             .filter(|&far| far > 0.0);
         let clusters = ClusterMap::new(&bsp, far_plane);
-        let mesh_placements = first_placements(&placements, geometry.meshes.len());
+        let standings = entity_geometry::standings(&placements, geometry.meshes.len());
         let lights = LightTable::collect(&LightInputs {
             bsp: &bsp,
             entities: &entities,
             geometry: &geometry,
-            placements: &mesh_placements,
+            standings: &standings,
             sources: &material_sources,
             materials: &materials,
             clusters: &clusters,
@@ -265,17 +257,17 @@ impl Scene {
     }
 
     /// Where each mesh stands first; `None` where no entity places it.
-    pub fn mesh_placements(&self) -> Vec<Option<Affine3A>> {
-        first_placements(&self.placements, self.geometry.meshes.len())
+    pub fn standings(&self) -> Vec<Option<Standing>> {
+        entity_geometry::standings(&self.placements, self.geometry.meshes.len())
     }
 
-    /// What the collection of lights looks at. `placements`: [`Self::mesh_placements`].
-    pub fn light_inputs<'a>(&'a self, placements: &'a [Option<Affine3A>]) -> LightInputs<'a> {
+    /// What the collection of lights looks at. `standings`: [`Self::standings`].
+    pub fn light_inputs<'a>(&'a self, standings: &'a [Option<Standing>]) -> LightInputs<'a> {
         LightInputs {
             bsp: &self.bsp,
             entities: &self.entities,
             geometry: &self.geometry,
-            placements,
+            standings,
             sources: &self.material_sources,
             materials: &self.materials,
             clusters: &self.clusters,
@@ -293,12 +285,4 @@ impl Scene {
         self.cells = LightCells::default();
         self.ambient = Ambient::default();
     }
-}
-
-fn first_placements(placements: &[Placement], meshes: usize) -> Vec<Option<Affine3A>> {
-    let mut first = vec![None; meshes];
-    for p in placements {
-        first[p.mesh as usize].get_or_insert(p.pose(Clock::default()));
-    }
-    first
 }

@@ -11,6 +11,7 @@ pub mod emission;
 pub mod entity_geometry;
 pub mod features;
 pub mod fog;
+pub mod guests;
 pub mod items;
 pub mod light_cells;
 pub mod light_power;

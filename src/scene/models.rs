@@ -1,14 +1,15 @@
 //! MD3 models as meshes of a scene.
 
-use super::material::{MaterialSource, Visibility};
-use super::records::{NONE, Triangle, VertexAttributes};
-use super::static_geometry::{Geometry, GeometryClass, Mesh};
+use super::material::MaterialSource;
+use super::records::NONE;
+use super::static_geometry::{GeometryClass, SurfaceMesh};
 use super::textures::TextureRequests;
 use crate::assets::bsp::Bounds;
-use crate::assets::md3::{Md3, Md3Surface, Md3Vertex};
+use crate::assets::bsp::patch::MeshVertex;
+use crate::assets::md3::{Md3, Md3Surface};
 use crate::assets::shader_script::ShaderLibrary;
 use crate::assets::vfs::{FileSource, VfsError};
-use glam::{Affine3A, Quat, Vec3};
+use glam::{Affine3A, Quat, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -25,7 +26,12 @@ struct Model {
     /// Frames that it lies between, and the share of the second.
     frames: [u32; 2],
     share: f32,
+    /// Numbers of the same with less detail, the most detailed first.
+    less_detailed: Vec<u32>,
 }
+
+/// A file `name_1.md3` has less detail than `name.md3`; there are so many at most.
+const LEVELS_OF_DETAIL: u32 = 2;
 
 /// Materials of a model's surfaces by name, in place of its own.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -73,13 +79,23 @@ impl Models {
         let found = match self.read(&path, files)? {
             None => None,
             Some(md3) => {
-                let materials = surface_materials(&md3, &Skin::default(), scripts, materials, requests);
-                self.models.push(Model {
+                let mut still = |md3: Arc<Md3>, less_detailed: Vec<u32>| Model {
+                    materials: surface_materials(&md3, &Skin::default(), scripts, materials, requests),
                     md3,
-                    materials,
                     frames: [0, 0],
                     share: 0.0,
-                });
+                    less_detailed,
+                };
+                let mut less_detailed = Vec::new();
+                for level in 1..=LEVELS_OF_DETAIL {
+                    let path = format!("{}_{level}.md3", path.trim_end_matches(".md3"));
+                    let Some(md3) = self.read_if_there(&path, files)? else {
+                        break;
+                    };
+                    self.models.push(still(md3, Vec::new()));
+                    less_detailed.push(self.models.len() as u32 - 1);
+                }
+                self.models.push(still(md3, less_detailed));
                 Some(self.models.len() as u32 - 1)
             }
         };
@@ -88,11 +104,17 @@ impl Models {
     }
 
     fn read(&mut self, path: &str, files: &dyn FileSource) -> Result<Option<Arc<Md3>>, VfsError> {
+        let warnings = self.warnings.len();
+        let found = self.read_if_there(path, files)?;
+        if found.is_none() && self.warnings.len() == warnings {
+            self.warnings.push(format!("missing model {path}"));
+        }
+        Ok(found)
+    }
+
+    fn read_if_there(&mut self, path: &str, files: &dyn FileSource) -> Result<Option<Arc<Md3>>, VfsError> {
         Ok(match files.read(path)?.map(|bytes| Md3::read(&bytes)) {
-            None => {
-                self.warnings.push(format!("missing model {path}"));
-                None
-            }
+            None => None,
             Some(Err(e)) => {
                 self.warnings.push(format!("cannot read {path}: {e}"));
                 None
@@ -132,10 +154,16 @@ impl Models {
                     materials: materials.clone(),
                     frames: [frame(i), frame(i + 1)],
                     share: s as f32 / between as f32,
+                    less_detailed: Vec::new(),
                 });
             }
         }
         Ok(Some((first, count * between)))
+    }
+
+    /// Numbers of the same model with less detail.
+    pub fn less_detailed(&self, number: u32) -> &[u32] {
+        &self.models[number as usize].less_detailed
     }
 
     /// Place of a tag on a model.
@@ -171,36 +199,21 @@ impl Models {
         (bounds.min + bounds.max) * 0.5
     }
 
-    /// Appends every model's first frame as a mesh; mesh `first + i` is model i.
-    pub fn append(&self, geometry: &mut Geometry, materials: &[MaterialSource]) {
-        for model in &self.models {
-            let mut mesh = Mesh {
-                class: if model.frames[0] != model.frames[1] {
-                    GeometryClass::EntityDynamic
-                } else {
-                    GeometryClass::EntityStatic
-                },
-                first_triangle: geometry.triangles.len() as u32,
-                opaque_count: 0,
-                triangle_count: 0,
-                bounds: Bounds::EMPTY,
+    /// The surfaces of every model.
+    pub fn shapes(&self) -> Vec<(GeometryClass, Vec<SurfaceMesh>)> {
+        let shape = |model: &Model| {
+            let class = if model.frames[0] != model.frames[1] {
+                GeometryClass::EntityDynamic
+            } else {
+                GeometryClass::EntityStatic
             };
-            for opaque in [true, false] {
-                for (surface, &material) in model.md3.surfaces.iter().zip(&model.materials) {
-                    let visibility = materials[material as usize].visibility;
-                    let shown = visibility != Visibility::Invisible;
-                    if shown && opaque == matches!(visibility, Visibility::Opaque | Visibility::Sky) {
-                        append_surface(geometry, surface, model, material, &mut mesh.bounds);
-                    }
-                }
-                let count = geometry.triangles.len() as u32 - mesh.first_triangle;
-                if opaque {
-                    mesh.opaque_count = count;
-                }
-                mesh.triangle_count = count;
-            }
-            geometry.meshes.push(mesh);
-        }
+            let surfaces = model.md3.surfaces.iter().zip(&model.materials);
+            (
+                class,
+                surfaces.filter_map(|(s, m)| surface_mesh(s, model, *m)).collect(),
+            )
+        };
+        self.models.iter().map(shape).collect()
     }
 }
 
@@ -236,41 +249,23 @@ fn material(
     materials.len() as u32 - 1
 }
 
-fn append_surface(geometry: &mut Geometry, surface: &Md3Surface, model: &Model, material: u32, bounds: &mut Bounds) {
+/// A surface of a model; `None` where it lacks the frame.
+fn surface_mesh(surface: &Md3Surface, model: &Model, material: u32) -> Option<SurfaceMesh> {
     let frame = |i: usize| surface.frames.get(model.frames[i] as usize);
-    let (Some(a), Some(b)) = (frame(0), frame(1)) else {
-        return;
-    };
-    let between = |(a, b): (&Md3Vertex, &Md3Vertex)| Md3Vertex {
-        position: a.position.lerp(b.position, model.share),
-        normal: a.normal.lerp(b.normal, model.share).normalize_or(a.normal),
-    };
-    let frame: Vec<Md3Vertex> = a.iter().zip(b).map(between).collect();
-    let base = geometry.positions.len() as u32;
-    for (v, uv) in frame.iter().zip(&surface.uvs) {
-        bounds.include(v.position);
-        geometry.positions.push(v.position.into());
-        geometry.attributes.push(VertexAttributes {
-            normal: v.normal.into(),
-            uv: (*uv).into(),
-            lightmap_uv: [0.0; 2],
-            color: u32::MAX,
-        });
-    }
-    for t in &surface.triangles {
-        let [a, b, c] = t.map(|i| frame[i as usize]);
-        let cross = (b.position - a.position).cross(c.position - a.position);
-        if cross.length_squared() <= f32::MIN_POSITIVE {
-            geometry.degenerate += 1;
-            continue;
-        }
-        let turned = cross.dot(a.normal + b.normal + c.normal) < 0.0;
-        let [x, y, z] = t.map(|i| base + i);
-        geometry.triangles.push(Triangle {
-            vertices: if turned { [x, z, y] } else { [x, y, z] },
-            material,
-            surface: NONE,
-            fallback_row: 0,
-        });
-    }
+    let (a, b) = (frame(0)?, frame(1)?);
+    let vertices: Vec<MeshVertex> = a
+        .iter()
+        .zip(b)
+        .zip(&surface.uvs)
+        .map(|((a, b), uv)| MeshVertex {
+            position: a.position.lerp(b.position, model.share),
+            normal: a.normal.lerp(b.normal, model.share).normalize_or(a.normal),
+            uv: *uv,
+            lightmap_uv: Vec2::ZERO,
+            color: Vec4::ONE,
+        })
+        .collect();
+    let indices = surface.triangles.as_flattened();
+    let inside = indices.iter().all(|i| (*i as usize) < vertices.len());
+    inside.then(|| SurfaceMesh::new(NONE, material, vertices, indices))
 }

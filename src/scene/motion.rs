@@ -67,6 +67,8 @@ pub struct Moment {
     pub camera: Camera,
     /// The weapon before the eye is drawn.
     pub draw_gun: bool,
+    /// Levels by which models have less detail than their size calls for; `None`: full detail everywhere.
+    pub lod_bias: Option<i32>,
 }
 
 impl From<Clock> for Moment {
@@ -76,6 +78,7 @@ impl From<Clock> for Moment {
             clock,
             camera: Camera::new(Vec3::ZERO, 0.0, 90.0),
             draw_gun: false,
+            lod_bias: None,
         }
     }
 }
@@ -289,6 +292,42 @@ impl Motion {
                 };
                 view * joined(chain, clock)
             }
+        }
+    }
+
+    /// Poses that a motion goes through, so densely that what lies between any two is within a hundredth of the size of the
+    /// bounds of all. A player has none: they go anywhere.
+    pub fn sweep(&self) -> Vec<Affine3A> {
+        const STEPS: u32 = 64;
+        let turned = |turn: &dyn Fn(f32) -> Quat, origin: Vec3| -> Vec<Affine3A> {
+            let at = |i| Affine3A::from_rotation_translation(turn(i as f32 / STEPS as f32 * TAU), origin);
+            (0..STEPS).map(at).collect()
+        };
+        match self {
+            Self::Still(pose) => vec![*pose],
+            Self::Train { legs, .. } => legs.iter().map(|l| Affine3A::from_translation(l.from)).collect(),
+            Self::Rotating { origin, axis, .. } => turned(&|angle| Quat::from_axis_angle(*axis, angle), *origin),
+            Self::Pendulum {
+                origin, axis, angle, ..
+            } => turned(&|phase| Quat::from_axis_angle(*axis, angle * phase.sin()), *origin),
+            Self::Bobbing { origin, way, .. } => [-1.0, 1.0]
+                .map(|s| Affine3A::from_translation(*origin + *way * s))
+                .to_vec(),
+            Self::Item {
+                place,
+                shift,
+                amplitude,
+                ..
+            } => {
+                let reach = Vec3::Z * (2.0 * amplitude);
+                let turns = turned(&Quat::from_rotation_z, Vec3::ZERO);
+                let at = |t: &Affine3A| *place * *t * Affine3A::from_translation(*shift);
+                turns
+                    .iter()
+                    .flat_map(|t| [at(t), Affine3A::from_translation(reach) * at(t)])
+                    .collect()
+            }
+            Self::Body(_) | Self::View(_) => Vec::new(),
         }
     }
 

@@ -2,6 +2,7 @@
 //! compares member offsets by reflection of the compiled shaders.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Affine3A;
 
 /// "None" in an index field.
 pub const NONE: u32 = u32::MAX;
@@ -160,6 +161,8 @@ pub struct RestVertex {
     /// First global vertex of its quad, for sprites; else [`NONE`].
     pub quad: u32,
     pub material: u32,
+    /// That carries it: in its space sprites look at the eye.
+    pub instance: u32,
 }
 
 /// Where a dynamic triangle stands in the trees' own orders.
@@ -351,12 +354,26 @@ pub struct Light {
     /// Area in square units (triangle, dome), radius in units (sphere), else 0.
     pub size: f32,
     pub p1: [f32; 3],
+    /// Instance that carries the light, or [`NONE`]. The scene has it in world space where it is at the start, the GPU in the
+    /// instance's space.
     pub instance: u32,
     pub p2: [f32; 3],
     pub padding: u32,
     pub radiance: [f32; 3],
     /// What the material's emission is multiplied by; triangles only.
     pub scale: f32,
+}
+
+impl Light {
+    /// The light after a rigid motion of what carries it.
+    pub fn moved(mut self, by: Affine3A) -> Self {
+        let turned = |v: [f32; 3]| by.transform_vector3(v.into()).into();
+        self.p0 = by.transform_point3(self.p0.into()).into();
+        if self.kind == LIGHT_TRIANGLE {
+            (self.p1, self.p2) = (turned(self.p1), turned(self.p2));
+        }
+        self
+    }
 }
 
 /// Inner node of the map's BSP for receiver classification.

@@ -1,9 +1,9 @@
 //! Static world and brush models: the map's drawn surfaces as triangles.
 
-use super::dynamic_geometry::{Dynamic, reach, swept};
+use super::dynamic_geometry::{Dynamic, DynamicPart, reach, swept};
 use super::material::{MaterialSource, Visibility};
 use super::models::Models;
-use super::records::{DEFORM_AUTOSPRITE, NONE, RestVertex, Triangle, VertexAttributes};
+use super::records::{DEFORM_AUTOSPRITE, Deform, NONE, RestVertex, Triangle, VertexAttributes};
 use crate::assets::bsp::lumps::{SURFACE_FLARE, SURFACE_PATCH, Surface};
 use crate::assets::bsp::patch::{CURVATURE_BOUND, MeshVertex, tessellate};
 use crate::assets::bsp::{Bounds, Bsp};
@@ -47,7 +47,7 @@ pub struct Geometry {
     pub positions: Vec<[f32; 3]>,
     pub attributes: Vec<VertexAttributes>,
     pub triangles: Vec<Triangle>,
-    /// `meshes[i]` is the map's model i, model 0 the world; then MD3 models.
+    /// `meshes[i]` is the map's model i, model 0 the world; then MD3 models; then the deforming parts of any of them.
     pub meshes: Vec<Mesh>,
     pub dynamic: Dynamic,
     /// Triangles from here on belong to no mesh: emitters that rays do not meet.
@@ -70,11 +70,38 @@ const LIFT_STEPS: u32 = 8;
 const LIFT_STEP: f32 = 1.0 / 1024.0;
 
 /// Triangles of one surface, wound counter-clockwise seen from the front.
-struct SurfaceMesh {
+pub struct SurfaceMesh {
+    /// Surface of the map, or [`NONE`].
     surface: u32,
+    material: u32,
     vertices: Vec<MeshVertex>,
     indices: Vec<u32>,
     degenerate: u32,
+}
+
+impl SurfaceMesh {
+    /// Winds triangles by their vertices' normals and leaves out those without area.
+    pub fn new(surface: u32, material: u32, vertices: Vec<MeshVertex>, indices: &[u32]) -> Self {
+        let mut out = Self {
+            surface,
+            material,
+            indices: Vec::with_capacity(indices.len()),
+            degenerate: 0,
+            vertices,
+        };
+        for t in indices.chunks_exact(3) {
+            let [a, b, c] = [t[0], t[1], t[2]].map(|i| out.vertices[i as usize]);
+            let cross = (b.position - a.position).cross(c.position - a.position);
+            if cross.length_squared() <= f32::MIN_POSITIVE || !cross.is_finite() {
+                out.degenerate += 1;
+            } else if cross.dot(a.normal + b.normal + c.normal) < 0.0 {
+                out.indices.extend([t[0], t[2], t[1]]);
+            } else {
+                out.indices.extend([t[0], t[1], t[2]]);
+            }
+        }
+        out
+    }
 }
 
 fn surface_mesh(bsp: &Bsp, materials: &[MaterialSource], index: u32) -> SurfaceMesh {
@@ -102,24 +129,7 @@ fn surface_mesh(bsp: &Bsp, materials: &[MaterialSource], index: u32) -> SurfaceM
     for v in &mut vertices {
         v.position += v.normal * lift;
     }
-    let mut out = SurfaceMesh {
-        surface: index,
-        indices: Vec::with_capacity(indices.len()),
-        degenerate: 0,
-        vertices,
-    };
-    for t in indices.chunks_exact(3) {
-        let [a, b, c] = [t[0], t[1], t[2]].map(|i| out.vertices[i as usize]);
-        let cross = (b.position - a.position).cross(c.position - a.position);
-        if cross.length_squared() <= f32::MIN_POSITIVE || !cross.is_finite() {
-            out.degenerate += 1;
-        } else if cross.dot(a.normal + b.normal + c.normal) < 0.0 {
-            out.indices.extend([t[0], t[2], t[1]]);
-        } else {
-            out.indices.extend([t[0], t[1], t[2]]);
-        }
-    }
-    out
+    SurfaceMesh::new(index, s.shader as u32, vertices, &indices)
 }
 
 /// Builds all models of a map, then the MD3 models that it places.
@@ -128,117 +138,96 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
         .into_par_iter()
         .map(|i| surface_mesh(bsp, materials, i))
         .collect();
-    let deforms = |s: &SurfaceMesh| {
-        !materials[bsp.surfaces[s.surface as usize].shader as usize]
-            .deforms
-            .is_empty()
-    };
-    let visibility = |s: &SurfaceMesh| materials[bsp.surfaces[s.surface as usize].shader as usize].visibility;
     let mut out = Geometry::default();
-    let mut untraced = Vec::new();
-    for (model_index, model) in bsp.models.iter().enumerate() {
-        let first_triangle = out.triangles.len() as u32;
+    let mut dynamic = Vec::new();
+    for (index, model) in bsp.models.iter().enumerate() {
         let range = model.first_surface.max(0) as usize..(model.first_surface.max(0) + model.surface_count) as usize;
-        let mut bounds = Bounds::EMPTY;
-        for tested in [false, true] {
-            for mesh in &meshes[range.clone()] {
-                let wanted = match visibility(mesh) {
-                    Visibility::Opaque | Visibility::Sky => !tested,
-                    Visibility::AlphaTested | Visibility::Layer => tested,
-                    Visibility::Invisible => {
-                        let shader = bsp.surfaces[mesh.surface as usize].shader as usize;
-                        if tested && emits[shader] {
-                            untraced.push(mesh.surface);
-                        }
-                        false
-                    }
-                };
-                if wanted && !(model_index == 0 && deforms(mesh)) {
-                    out.append(bsp, mesh);
-                    for v in &mesh.vertices {
-                        bounds.include(v.position);
-                    }
-                }
-            }
-            if !tested {
-                out.meshes.push(Mesh {
-                    class: if model_index == 0 {
-                        GeometryClass::WorldStatic
-                    } else {
-                        GeometryClass::EntityStatic
-                    },
-                    first_triangle,
-                    opaque_count: out.triangles.len() as u32 - first_triangle,
-                    triangle_count: 0,
-                    bounds,
-                });
-            }
+        let class = if index == 0 {
+            GeometryClass::WorldStatic
+        } else {
+            GeometryClass::EntityStatic
+        };
+        let (still, moved) = parted(&meshes[range], materials);
+        out.append_mesh(class, &still, materials);
+        dynamic.push(moved);
+    }
+    let shapes: Vec<(GeometryClass, Vec<SurfaceMesh>)> = models.shapes();
+    for (class, shape) in &shapes {
+        // Each step of an animation has a tree of its own already: its materials do not deform it.
+        let (still, moved) = match class {
+            GeometryClass::EntityDynamic => (shape.iter().collect(), Vec::new()),
+            _ => parted(shape, materials),
+        };
+        out.append_mesh(*class, &still, materials);
+        dynamic.push(moved);
+    }
+    out.dynamic.vertices = out.positions.len() as u32..out.positions.len() as u32;
+    for (carrier, surfaces) in (0u32..).zip(&dynamic) {
+        if !surfaces.is_empty() {
+            out.append_dynamic(carrier, materials, surfaces);
         }
-        let triangle_count = out.triangles.len() as u32 - first_triangle;
-        let mesh = &mut out.meshes[model_index];
-        mesh.triangle_count = triangle_count;
-        mesh.bounds = bounds;
     }
-    models.append(&mut out, materials);
-    let world = bsp.models.first().map_or(0..0, |m| {
-        let first = m.first_surface.max(0) as usize;
-        first..first + m.surface_count.max(0) as usize
-    });
-    let dynamic: Vec<&SurfaceMesh> = meshes[world]
-        .iter()
-        .filter(|m| deforms(m) && visibility(m) != Visibility::Invisible)
-        .collect();
-    if !dynamic.is_empty() {
-        out.append_dynamic(bsp, materials, &dynamic, |m| {
-            matches!(visibility(m), Visibility::Opaque | Visibility::Sky)
-        });
-    }
+    out.dynamic.vertices.end = out.positions.len() as u32;
     out.untraced_from = out.triangles.len() as u32;
-    for surface in untraced {
-        out.append(bsp, &meshes[surface as usize]);
+    for mesh in meshes {
+        let material = mesh.material as usize;
+        if materials[material].visibility == Visibility::Invisible && emits[material] {
+            out.append(&mesh);
+        }
     }
     out
 }
 
+/// Surfaces that keep their form, and those that are deformed.
+fn parted<'a>(
+    surfaces: &'a [SurfaceMesh],
+    materials: &[MaterialSource],
+) -> (Vec<&'a SurfaceMesh>, Vec<&'a SurfaceMesh>) {
+    let shown = |s: &&SurfaceMesh| materials[s.material as usize].visibility != Visibility::Invisible;
+    surfaces
+        .iter()
+        .filter(shown)
+        .partition(|s| materials[s.material as usize].deforms.is_empty())
+}
+
+fn opaque(surface: &SurfaceMesh, materials: &[MaterialSource]) -> bool {
+    let visibility = materials[surface.material as usize].visibility;
+    matches!(visibility, Visibility::Opaque | Visibility::Sky)
+}
+
 impl Geometry {
-    /// Appends the world's deforming surfaces as a mesh of their own.
-    fn append_dynamic(
-        &mut self,
-        bsp: &Bsp,
-        materials: &[MaterialSource],
-        surfaces: &[&SurfaceMesh],
-        opaque: impl Fn(&SurfaceMesh) -> bool,
-    ) {
+    /// Appends surfaces that keep their form as a mesh.
+    fn append_mesh(&mut self, class: GeometryClass, surfaces: &[&SurfaceMesh], materials: &[MaterialSource]) {
+        let first_triangle = self.triangles.len() as u32;
+        let mut bounds = Bounds::EMPTY;
+        let mut opaque_count = 0;
+        for wanted in [true, false] {
+            for mesh in surfaces.iter().filter(|m| opaque(m, materials) == wanted) {
+                self.append(mesh);
+                mesh.vertices.iter().for_each(|v| bounds.include(v.position));
+            }
+            if wanted {
+                opaque_count = self.triangles.len() as u32 - first_triangle;
+            }
+        }
+        self.meshes.push(Mesh {
+            class,
+            first_triangle,
+            opaque_count,
+            triangle_count: self.triangles.len() as u32 - first_triangle,
+            bounds,
+        });
+    }
+
+    /// Appends the deforming surfaces of mesh `carrier` as a mesh of their own.
+    fn append_dynamic(&mut self, carrier: u32, materials: &[MaterialSource], surfaces: &[&SurfaceMesh]) {
         let first_triangle = self.triangles.len() as u32;
         let first_vertex = self.positions.len() as u32;
         let mut opaque_count = 0;
         let mut boxes = Vec::new();
-        let mut rest = Vec::new();
         for wanted in [true, false] {
-            for mesh in surfaces.iter().filter(|m| opaque(m) == wanted) {
-                let base = self.positions.len() as u32;
-                let first = self.triangles.len();
-                self.append(bsp, mesh);
-                let material = bsp.surfaces[mesh.surface as usize].shader as u32;
-                let deforms = &materials[material as usize].deforms;
-                let sprites = deforms.iter().any(|d| d.kind >= DEFORM_AUTOSPRITE);
-                let quads = sprites && mesh.vertices.len().is_multiple_of(4);
-                rest.extend(mesh.vertices.iter().enumerate().map(|(i, v)| RestVertex {
-                    position: v.position.into(),
-                    normal: v.normal.into(),
-                    quad: if quads { base + i as u32 / 4 * 4 } else { NONE },
-                    // What is made of anything but quads can't turn.
-                    material: if sprites && !quads { NONE } else { material },
-                }));
-                for t in first..self.triangles.len() {
-                    let vertices = self.triangles[t].vertices;
-                    let at = |v: u32| Vec3::from(self.positions[v as usize]);
-                    let quad = quads.then(|| {
-                        let q = base + (vertices[0] - base) / 4 * 4;
-                        std::array::from_fn(|k| at(q + k as u32))
-                    });
-                    boxes.push(swept(vertices.map(at), quad, reach(deforms)));
-                }
+            for mesh in surfaces.iter().filter(|m| opaque(m, materials) == wanted) {
+                self.append_deformed(mesh, &materials[mesh.material as usize].deforms, &mut boxes);
             }
             if wanted {
                 opaque_count = self.triangles.len() as u32 - first_triangle;
@@ -248,14 +237,18 @@ impl Geometry {
         for corner in boxes.as_flattened() {
             bounds.include(*corner);
         }
-        self.dynamic = Dynamic {
+        self.dynamic.parts.push(DynamicPart {
             mesh: self.meshes.len() as u32,
+            carrier,
             vertices: first_vertex..self.positions.len() as u32,
-            rest,
             boxes,
-        };
+        });
         self.meshes.push(Mesh {
-            class: GeometryClass::WorldDynamic,
+            class: if carrier == 0 {
+                GeometryClass::WorldDynamic
+            } else {
+                GeometryClass::EntityDynamic
+            },
             first_triangle,
             opaque_count,
             triangle_count: self.triangles.len() as u32 - first_triangle,
@@ -263,7 +256,33 @@ impl Geometry {
         });
     }
 
-    fn append(&mut self, bsp: &Bsp, mesh: &SurfaceMesh) {
+    fn append_deformed(&mut self, mesh: &SurfaceMesh, deforms: &[Deform], boxes: &mut Vec<[Vec3; 2]>) {
+        let base = self.positions.len() as u32;
+        let first = self.triangles.len();
+        self.append(mesh);
+        let sprites = deforms.iter().any(|d| d.kind >= DEFORM_AUTOSPRITE);
+        let quads = sprites && mesh.vertices.len().is_multiple_of(4);
+        let rest = mesh.vertices.iter().enumerate().map(|(i, v)| RestVertex {
+            position: v.position.into(),
+            normal: v.normal.into(),
+            quad: if quads { base + i as u32 / 4 * 4 } else { NONE },
+            // What is made of anything but quads can't turn.
+            material: if sprites && !quads { NONE } else { mesh.material },
+            instance: NONE,
+        });
+        self.dynamic.rest.extend(rest);
+        for t in first..self.triangles.len() {
+            let vertices = self.triangles[t].vertices;
+            let at = |v: u32| Vec3::from(self.positions[v as usize]);
+            let quad = quads.then(|| {
+                let q = base + (vertices[0] - base) / 4 * 4;
+                std::array::from_fn(|k| at(q + k as u32))
+            });
+            boxes.push(swept(vertices.map(at), quad, reach(deforms)));
+        }
+    }
+
+    fn append(&mut self, mesh: &SurfaceMesh) {
         let base = self.positions.len() as u32;
         for v in &mesh.vertices {
             self.positions.push(v.position.into());
@@ -275,11 +294,10 @@ impl Geometry {
                 color: u32::from_le_bytes(color),
             });
         }
-        let material = bsp.surfaces[mesh.surface as usize].shader as u32;
         for t in mesh.indices.chunks_exact(3) {
             self.triangles.push(Triangle {
                 vertices: [base + t[0], base + t[1], base + t[2]],
-                material,
+                material: mesh.material,
                 surface: mesh.surface,
                 fallback_row: 0,
             });
