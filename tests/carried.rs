@@ -7,7 +7,7 @@ mod gpu_fixture;
 
 use common::analytic::boxed;
 use common::{camera, gpu_film, installed, quiet, scene};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use gpu_fixture::with_device;
 use q3rays::assets::bsp::build::fixtures::Fixture;
 use q3rays::assets::bsp::build::{Bounds, Entity, Mapping, Paint, Solid};
@@ -16,6 +16,8 @@ use q3rays::reference::CpuRenderer;
 use q3rays::reference::light_cells;
 use q3rays::render::backend::Backend;
 use q3rays::render::film::Film;
+use q3rays::render::frame::FrameInput;
+use q3rays::render::gpu_renderer::GpuRenderer;
 use q3rays::render::scene_gpu::SceneGpu;
 use q3rays::render::settings::{AmbientLight, LightSampling, Settings, ShownEmission};
 use q3rays::scene::Scene;
@@ -26,6 +28,7 @@ use q3rays::scene::guests::flashlight;
 use q3rays::scene::light_power::luminance;
 use q3rays::scene::lights::point_light;
 use q3rays::scene::material::Visibility;
+use q3rays::scene::polygons::{Corner, Polygon};
 use q3rays::scene::records::LIGHT_SUN;
 
 const SIZE: (u32, u32) = (32, 18);
@@ -369,5 +372,132 @@ fn suns_are_as_bright_as_their_light() {
             "{on} on the GPU, {} on the CPU",
             cpu(true)
         );
+    });
+}
+
+/// A mark on a wall that the frame brings along looks like the same quad built into the map, comes and goes, and there may be many.
+#[test]
+fn polygons_look_like_surfaces_of_the_map() {
+    let script = "textures/fixture/mark\n{\n\tsurfaceparm trans\n\tcull none\n\t{\n\t\tmap $whiteimage\n\t\tblendFunc \
+                  filter\n\t\trgbGen vertex\n\t}\n}\n";
+    let (low, high) = (Vec3::new(255.9, 90.0, 90.0), Vec3::new(255.9, 160.0, 150.0));
+    let corners = [
+        low,
+        Vec3::new(low.x, low.y, high.z),
+        high,
+        Vec3::new(low.x, high.y, low.z),
+    ];
+    let lit = |map: &mut q3rays::assets::bsp::build::MapBuilder| {
+        map.entity(Entity::light(Vec3::new(60.0, 128.0, 200.0), 300.0, [1.0; 3]));
+    };
+    let grey = script.replace("rgbGen vertex", "rgbGen const ( 0.5 0.5 0.5 )");
+    let built = scene(&boxed("built", &grey, |map, _| {
+        let paint = Paint {
+            shader: map.shader("textures/fixture/mark", surface_flags::NOLIGHTMAP, 0),
+            mapping: Mapping::Fit,
+        };
+        map.quad(corners, paint);
+        lit(map);
+    }));
+    let bare = boxed("bare", &grey, |map, _| lit(map));
+    let options = q3rays::scene::load::LoadOptions {
+        polygons: 256,
+        materials: vec!["textures/fixture/mark".to_owned()],
+        ..Default::default()
+    };
+    let files = common::Files(bare.files());
+    let mut scene = Scene::load_with(&files, "bare", &options).unwrap();
+    let material = scene.material("textures/fixture/mark").unwrap();
+    let polygon = |corners: &[Vec3]| Polygon {
+        material,
+        corners: corners
+            .iter()
+            .map(|p| Corner {
+                position: *p,
+                uv: Vec2::ZERO,
+                color: [255; 4],
+            })
+            .collect(),
+    };
+    let mark = polygon(&corners);
+    let (every, none) = (
+        Settings {
+            random_lights: 0,
+            ..settings()
+        },
+        cpu(&scene, &settings(), 1),
+    );
+    let bare_film = cpu(&scene, &every, 16);
+    let truth = cpu(&built, &every, 16);
+    assert!(apart(&truth, &bare_film) > 0.02 && none.mean.len() == truth.mean.len());
+    // Many small ones elsewhere: the tree has more than one node.
+    let mut all: Vec<Polygon> = (0..100)
+        .map(|i| {
+            let at = Vec3::new(128.0, 2.0 * i as f32, 2.0);
+            polygon(&[at, at + Vec3::Y, at + Vec3::Z])
+        })
+        .collect();
+    let crumbs = all.clone();
+    all.push(mark.clone());
+    scene.set_polygons(std::slice::from_ref(&mark)).unwrap();
+    assert!(apart(&cpu(&scene, &every, 16), &truth) < 0.01);
+    let too_many: Vec<Polygon> = (0..300).map(|_| mark.clone()).collect();
+    let refused = scene.set_polygons(&too_many).unwrap_err().to_string();
+    assert!(
+        refused.contains("bare") && refused.contains("600") && refused.contains("256"),
+        "{refused}"
+    );
+    scene.set_polygons(&all).unwrap();
+    let with_crumbs = cpu(&scene, &every, 16);
+    scene.set_polygons(&[]).unwrap();
+    assert_eq!(apart(&cpu(&scene, &every, 16), &bare_film), 0.0);
+    with_device(|device| {
+        for backend in [Backend::Bvh, Backend::RayQuery] {
+            let gpu = SceneGpu::new(device, &scene, backend, BvhQuality::Balanced).unwrap();
+            let renderer = GpuRenderer::new(&gpu).unwrap();
+            let film = |polygons: &[Polygon]| {
+                let mut view = renderer.view(SIZE).unwrap();
+                for index in 0..16 {
+                    let input = FrameInput {
+                        camera: crate::view(),
+                        settings: every,
+                        lights: &[],
+                        polygons,
+                        sample_index: index,
+                        accumulated: index + 1,
+                        exposure_blend: 1.0,
+                        reuse: false,
+                        output: false,
+                    };
+                    renderer.frame(&mut view, &input).unwrap();
+                }
+                q3rays::render::gpu_renderer::film(&view, 16).unwrap()
+            };
+            for (polygons, wanted) in [
+                (&[][..], &bare_film),
+                (std::slice::from_ref(&mark), &truth),
+                (&all, &with_crumbs),
+                (&crumbs, &with_crumbs),
+                (&[], &bare_film),
+            ] {
+                let share = apart(&film(polygons), wanted);
+                // The mark is missing from the last but one.
+                let same = polygons.len() != crumbs.len();
+                assert_eq!(share < 0.02, same, "{backend:?}, {} polygons: {share}", polygons.len());
+            }
+            let mut view = renderer.view(SIZE).unwrap();
+            let input = FrameInput {
+                camera: crate::view(),
+                settings: every,
+                lights: &[],
+                polygons: &too_many,
+                sample_index: 0,
+                accumulated: 1,
+                exposure_blend: 1.0,
+                reuse: false,
+                output: false,
+            };
+            assert!(renderer.frame(&mut view, &input).is_err());
+        }
     });
 }

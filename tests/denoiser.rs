@@ -34,6 +34,7 @@ fn input(camera: &Camera, settings: &Settings, index: u32) -> FrameInput<'static
         camera: *camera,
         settings: *settings,
         lights: &[],
+        polygons: &[],
         sample_index: index,
         accumulated: 0,
         exposure_blend: 1.0,

@@ -249,6 +249,7 @@ fn moved_points(gpu: &SceneGpu, scene: &Scene, size: (u32, u32)) {
                 ..settings()
             },
             lights: &[],
+            polygons: &[],
             sample_index: index,
             accumulated: 0,
             exposure_blend: 1.0,
@@ -360,6 +361,7 @@ fn a_mirror_shows_what_an_eye_behind_it_sees() {
                 camera: c,
                 settings: still,
                 lights: &[],
+                polygons: &[],
                 sample_index: index,
                 accumulated: 0,
                 exposure_blend: 1.0,

@@ -31,7 +31,11 @@ fn settings() -> Settings {
 
 fn load(player: Option<Player>) -> Scene {
     let files = installed().focused_on("showcase");
-    Scene::load_with(&files, "showcase", &LoadOptions { player }).unwrap()
+    let options = LoadOptions {
+        player,
+        ..LoadOptions::default()
+    };
+    Scene::load_with(&files, "showcase", &options).unwrap()
 }
 
 /// Pixels in which two films differ.

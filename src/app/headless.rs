@@ -106,6 +106,7 @@ pub fn run_frames(
                 }
             },
             lights: &[],
+            polygons: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -212,6 +212,7 @@ impl Shown {
                 now
             },
             lights: &[],
+            polygons: &[],
             sample_index: self.frame,
             accumulated: self.accumulated,
             exposure_blend: (EXPOSURE_RATE * seconds).min(1.0),

@@ -107,6 +107,7 @@ impl DenoiserBench {
             camera: *camera,
             settings: *settings,
             lights: &[],
+            polygons: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -209,6 +209,7 @@ impl LightsBench {
             camera: self.camera,
             settings: *settings,
             lights: &[],
+            polygons: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -111,7 +111,11 @@ impl Common {
         cvars: &Cvars,
         player: Option<Player>,
     ) -> Result<(Scene, Lighting), CliError> {
-        let mut scene = Scene::load_with(files, map, &LoadOptions { player }).map_err(CliError::failed)?;
+        let options = LoadOptions {
+            player,
+            ..LoadOptions::default()
+        };
+        let mut scene = Scene::load_with(files, map, &options).map_err(CliError::failed)?;
         report_warnings(&scene);
         let bar = progress(RECOVERY_STEPS, &format!("{map}: lights"));
         let lit = lighting::light(

@@ -1,6 +1,7 @@
 //! Trees in the shaders' layouts: see `shaders/include/trace_cwbvh.glsl` and `trace_bvh2.glsl`.
 
 use crate::scene::bvh::{BvhQuality, mesh_triangles};
+use crate::scene::polygons::Shape;
 use crate::scene::records::{DynamicTriangle, Instance, MATERIAL_ALPHA_TESTED, MATERIAL_LAYER};
 use crate::scene::static_geometry::{Geometry, Mesh};
 use crate::scene::{Scene, bvh};
@@ -70,6 +71,8 @@ pub struct MeshTrees {
     pub bvh2_triangles: Vec<[f32; 12]>,
     /// Where the triangles of the dynamic meshes are in both.
     pub dynamic: Vec<DynamicTriangle>,
+    /// Record of the mesh of polygons, where there is one; its tree is empty.
+    pub polygons: MeshTree,
 }
 
 struct BuiltMesh {
@@ -190,7 +193,7 @@ impl MeshTrees {
                     });
                 }
             }
-            out.records.push(MeshTree {
+            let record = MeshTree {
                 cwbvh_node: out.cwbvh_nodes.len() as u32,
                 cwbvh_triangle: out.cwbvh_triangles.len() as u32,
                 bvh2_node: out.bvh2_nodes.len() as u32,
@@ -199,7 +202,17 @@ impl MeshTrees {
                 first_triangle: mesh.first_triangle,
                 opaque_count: mesh.opaque_count,
                 padding: 0,
-            });
+            };
+            out.records.push(record);
+            if let Some(room) = geometry.polygons.filter(|r| r.mesh as usize == index) {
+                out.polygons = record;
+                let most = room.triangles.max(1) as usize;
+                out.cwbvh_nodes.extend(std::iter::repeat_n([0; 20], most));
+                out.cwbvh_triangles.extend(std::iter::repeat_n([0.0; 12], most));
+                out.bvh2_nodes.extend(std::iter::repeat_n([0.0; 16], most));
+                out.bvh2_triangles.extend(std::iter::repeat_n([0.0; 12], most));
+                continue;
+            }
             out.cwbvh_nodes
                 .extend(b.cwbvh.nodes.iter().map(|n| bytemuck::cast::<_, [u32; 20]>(*n)));
             if mesh.triangle_count == 0 {
@@ -222,7 +235,11 @@ impl MeshTrees {
                 };
                 out.dynamic.extend((0u32..).zip(places).map(place));
             }
-            let pack = |i: &u32| packed_triangle(scene, mesh.first_triangle + i);
+            let pack = |i: &u32| {
+                let t = mesh.first_triangle + i;
+                let material = geometry.triangles[t as usize].material;
+                packed_triangle(t, geometry.corners(t), scene.materials[material as usize].flags)
+            };
             out.cwbvh_triangles.extend(b.cwbvh.primitive_indices.iter().map(pack));
             out.bvh2_triangles.extend(b.order2.iter().map(pack));
             out.bvh2_nodes.extend(b.nodes2);
@@ -239,10 +256,73 @@ impl MeshTrees {
     }
 }
 
-fn packed_triangle(scene: &Scene, triangle: u32) -> [f32; 12] {
-    let [a, b, c] = scene.geometry.corners(triangle);
-    let material = &scene.materials[scene.geometry.triangles[triangle as usize].material as usize];
-    let tested = material.flags & (MATERIAL_ALPHA_TESTED | MATERIAL_LAYER) != 0;
+/// Tree of a frame's polygons.
+#[derive(Clone, Debug, Default)]
+pub struct PolygonTree {
+    pub cwbvh_nodes: Vec<[u32; 20]>,
+    pub cwbvh_triangles: Vec<[f32; 12]>,
+    pub bvh2_nodes: Vec<[f32; 16]>,
+    pub bvh2_triangles: Vec<[f32; 12]>,
+    /// Reference of the binary tree's root.
+    pub root: u32,
+}
+
+/// Builds the trees over polygons. `flags`: of the scene's materials.
+///
+/// # Errors
+/// [`TreeError`] where a tree is beyond what the shaders can walk.
+pub fn polygon_tree(shape: &Shape, flags: &[u32], map: &str) -> Result<PolygonTree, TreeError> {
+    let corners = |i: u32| std::array::from_fn(|k| Vec3::from(shape.positions[3 * i as usize + k]));
+    let count = shape.triangles.len() as u32;
+    if count == 0 {
+        return Ok(PolygonTree {
+            cwbvh_nodes: vec![[0; 20]],
+            bvh2_triangles: vec![[0.0; 12]],
+            root: BVH2_LEAF,
+            ..PolygonTree::default()
+        });
+    }
+    let boxes: Vec<Aabb> = (0..count)
+        .map(|i| {
+            let [a, b, c]: [Vec3; 3] = corners(i);
+            Aabb::new(a.min(b).min(c).into(), a.max(b).max(c).into())
+        })
+        .collect();
+    let mut params = obvhs::BvhBuildParams::fast_build();
+    params.max_prims_per_leaf = params.max_prims_per_leaf.min(BVH2_LEAF_SIZE);
+    let mut time = Duration::default();
+    let wide = build_cwbvh(&boxes, params, &mut time);
+    let binary = build_bvh2(&boxes, params, &mut time);
+    let (bvh2_nodes, root, depth) = pack_pairs(&binary, |first, count| BVH2_LEAF | (count - 1) << 27 | first);
+    for (tree, depth, most) in [
+        ("8-wide", cwbvh_depth(&wide), CWBVH_STACK),
+        ("binary", depth, BVH2_STACK),
+    ] {
+        if depth > most {
+            return Err(TreeError::Depth {
+                map: map.to_owned(),
+                tree,
+                mesh: shape.mesh.first_triangle as usize,
+                depth,
+                most,
+            });
+        }
+    }
+    let pack = |i: &u32| {
+        let material = shape.triangles[*i as usize].material;
+        packed_triangle(shape.mesh.first_triangle + i, corners(*i), flags[material as usize])
+    };
+    Ok(PolygonTree {
+        cwbvh_nodes: wide.nodes.iter().map(|n| bytemuck::cast(*n)).collect(),
+        cwbvh_triangles: wide.primitive_indices.iter().map(pack).collect(),
+        bvh2_nodes,
+        bvh2_triangles: binary.primitive_indices.iter().map(pack).collect(),
+        root,
+    })
+}
+
+fn packed_triangle(triangle: u32, [a, b, c]: [Vec3; 3], flags: u32) -> [f32; 12] {
+    let tested = flags & (MATERIAL_ALPHA_TESTED | MATERIAL_LAYER) != 0;
     let id = triangle | if tested { NOT_OPAQUE_BIT } else { 0 };
     let (e1, e2) = (b - a, c - a);
     [

@@ -18,6 +18,8 @@ pub struct DriverStructures {
     pub statistics: BuildStatistics,
     /// Of the dynamic meshes.
     pub refits: Vec<DynamicRefit>,
+    /// Of the mesh of polygons.
+    pub polygons: Option<DynamicRefit>,
 }
 
 /// What refits the driver's structure over a dynamic mesh.
@@ -71,8 +73,9 @@ pub fn build(
     indices: &Buffer,
 ) -> Result<DriverStructures, GpuError> {
     let g = &scene.geometry;
+    let room = |mesh: usize| g.polygons.filter(|r| r.mesh as usize == mesh);
     let used: Vec<usize> = (0..g.meshes.len())
-        .filter(|&m| g.meshes[m].triangle_count > 0)
+        .filter(|&m| g.meshes[m].triangle_count > 0 || room(m).is_some())
         .collect();
     let geometries: Vec<Vec<TriangleGeometry>> = used
         .iter()
@@ -86,9 +89,10 @@ pub fn build(
                 triangle_count: count,
                 opaque,
             };
+            let count = room(m).map_or(mesh.triangle_count, |r| r.triangles);
             vec![
                 part(0, mesh.opaque_count, true),
-                part(mesh.opaque_count, mesh.triangle_count - mesh.opaque_count, false),
+                part(mesh.opaque_count, count - mesh.opaque_count, false),
             ]
         })
         .collect();
@@ -96,7 +100,7 @@ pub fn build(
         .iter()
         .zip(&used)
         .map(|(geometries, &mesh)| {
-            let moves = g.dynamic.part(mesh).is_some();
+            let moves = g.dynamic.part(mesh).is_some() || room(mesh).is_some();
             BottomDesc {
                 name: "mesh",
                 geometries,
@@ -108,19 +112,25 @@ pub fn build(
         .collect();
     let (bottom, statistics) = BottomLevel::build(device, &descriptions)?;
     let mut levels: Vec<Option<BottomLevel>> = (0..g.meshes.len()).map(|_| None).collect();
-    let mut refits = Vec::new();
+    let (mut refits, mut polygons) = (Vec::new(), None);
     for ((mesh, level), geometries) in used.into_iter().zip(bottom).zip(&geometries) {
-        if g.dynamic.part(mesh).is_some() {
+        let rebuild = room(mesh).is_some();
+        if rebuild || g.dynamic.part(mesh).is_some() {
             let one = Refit {
                 bottom: &level,
                 geometries,
-                rebuild: false,
+                rebuild,
             };
-            refits.push(DynamicRefit {
+            let made = DynamicRefit {
                 mesh: mesh as u32,
                 scratch: Scratch::new(device, BottomLevel::refit_scratch_bytes(device, &[one]))?,
                 geometries: geometries.clone(),
-            });
+            };
+            if rebuild {
+                polygons = Some(made);
+            } else {
+                refits.push(made);
+            }
         }
         levels[mesh] = Some(level);
     }
@@ -136,5 +146,6 @@ pub fn build(
         top,
         statistics,
         refits,
+        polygons,
     })
 }

@@ -15,7 +15,7 @@ use super::pass::{PassContext, Recorder};
 use super::primary::Primary;
 use super::resample::Resample;
 use super::reuse::Reuse;
-use super::scene_gpu::SceneGpu;
+use super::scene_gpu::{RenderError, SceneGpu};
 use super::secondary::Secondary;
 use super::settings::Settings;
 use super::taa::Taa;
@@ -25,6 +25,7 @@ use super::view_state::ViewState;
 use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps};
 use crate::scene::camera::Camera;
 use crate::scene::guests::guests;
+use crate::scene::polygons::Polygon;
 use crate::scene::records::Light;
 use std::sync::Arc;
 
@@ -39,6 +40,8 @@ pub struct FrameInput<'a> {
     pub settings: Settings,
     /// Lights that are in this frame beside the map's: [`crate::scene::guests`]. World space; any number.
     pub lights: &'a [Light],
+    /// Polygons that are in this frame: [`crate::scene::polygons`].
+    pub polygons: &'a [Polygon],
     /// Number of the sample that every pixel takes.
     pub sample_index: u32,
     /// Samples accumulated with this one; 0 shows this frame alone.
@@ -125,7 +128,7 @@ impl FrameRenderer {
     /// Records one frame of a view. `slot` names the frame in flight whose constants and counters may be written.
     ///
     /// # Errors
-    /// [`GpuError`] of the device.
+    /// [`RenderError`] where the input does not fit the scene, or of the device.
     pub fn record(
         &self,
         cmd: &Commands<'_>,
@@ -134,7 +137,7 @@ impl FrameRenderer {
         view: &mut ViewState,
         slot: usize,
         input: &FrameInput<'_>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<(), RenderError> {
         view.gbuffer.parity ^= 1;
         view.anti_aliased = input.anti_aliases();
         let constants = frame_constants(scene, view, slot, input)?;
@@ -142,6 +145,9 @@ impl FrameRenderer {
             let revision = scene.revision().wrapping_add(view.guests.revision);
             view.history.advance(constants, input, revision, scene.moving)
         };
+        let polygons = view
+            .polygons
+            .record(cmd, &mut view.tracker, scene, slot, input.polygons)?;
         if scene.moving.geometry {
             let moving = match view.moving.take() {
                 Some(made) => made,
@@ -149,7 +155,7 @@ impl FrameRenderer {
             };
             let moving = view.moving.insert(moving);
             let now = input.settings.moment(&input.camera);
-            constants = moving.advance(scene, slot, now, constants)?;
+            constants = moving.advance(scene, slot, now, polygons, constants)?;
         }
         let reuses = input.reuses();
         if reuses {

@@ -5,7 +5,7 @@ use super::frame::{FrameInput, FrameRenderer};
 use super::scene_gpu::{RenderError, SceneGpu};
 use super::settings::{Secondary, Settings};
 use super::view_state::ViewState;
-use crate::gpu::{GpuError, Image};
+use crate::gpu::{Commands, GpuError, Image};
 use crate::reference::direct::RayCounts;
 use crate::scene::camera::{Camera, Shot};
 use crate::scene::records::NONE;
@@ -69,7 +69,14 @@ impl<'a> GpuRenderer<'a> {
     /// [`RenderError`] of the device.
     pub fn frame(&self, view: &mut ViewState, input: &FrameInput) -> Result<(), RenderError> {
         let device = &self.scene.device;
-        Ok(device.submit_once("frame", |cmd| self.frames.record(cmd, None, self.scene, view, 0, input))?)
+        let record = |cmd: &Commands<'_>| {
+            let recorded = self.frames.record(cmd, None, self.scene, view, 0, input);
+            recorded.map_err(|e| match e {
+                RenderError::Gpu(e) => e,
+                other => GpuError::InvalidInput(other.to_string()),
+            })
+        };
+        Ok(device.submit_once("frame", record)?)
     }
 
     /// Takes sample `index` into a view's accumulation of which it is number `accumulated`, counted from 1.
@@ -88,6 +95,7 @@ impl<'a> GpuRenderer<'a> {
             camera: *camera,
             settings: *settings,
             lights: &[],
+            polygons: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

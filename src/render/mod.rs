@@ -20,6 +20,7 @@ pub mod guests;
 pub mod history;
 pub mod moving;
 pub mod pass;
+pub mod polygons;
 pub mod primary;
 pub mod realtime;
 pub mod resample;

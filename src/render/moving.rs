@@ -8,7 +8,9 @@ use crate::gpu::acceleration::{TopInstance, TopLevel};
 use crate::gpu::{Access, Buffer, Commands, DescriptorSets, GpuError, MemoryKind, Tracker, Use, Write};
 use crate::scene::motion::Moment;
 use crate::scene::records::Instance;
+use crate::scene::static_geometry::Mesh;
 use ash::vk;
+use std::borrow::Cow;
 
 /// A view's own instances.
 pub struct Moving {
@@ -54,7 +56,7 @@ impl Moving {
         })
     }
 
-    /// Writes a frame's instances and tells its constants.
+    /// Writes a frame's instances and tells its constants. `polygons`: their mesh.
     ///
     /// # Errors
     /// [`GpuError`] of the device.
@@ -63,16 +65,20 @@ impl Moving {
         scene: &SceneGpu,
         slot: usize,
         now: Moment,
+        polygons: Option<Mesh>,
         constants: FrameConstants,
     ) -> Result<FrameConstants, GpuError> {
         let before = self.before.replace(now).unwrap_or(now);
+        let mut meshes = Cow::Borrowed(&scene.meshes);
+        if let (Some(mesh), Some(room)) = (polygons, scene.polygons.room) {
+            meshes.to_mut()[room.mesh as usize] = mesh;
+        }
         let records: Vec<Instance> = scene
             .placements
             .iter()
-            .map(|p| p.record(&scene.meshes, &now, &before))
+            .map(|p| p.record(&meshes, &now, &before))
             .collect();
-        let tree =
-            instance_tree(&scene.meshes, &records, &scene.name).map_err(|e| GpuError::InvalidInput(e.to_string()))?;
+        let tree = instance_tree(&meshes, &records, &scene.name).map_err(|e| GpuError::InvalidInput(e.to_string()))?;
         let count = if tree.is_some() {
             records.len()
         } else {

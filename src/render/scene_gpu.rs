@@ -1,7 +1,7 @@
 //! A scene on the GPU: buffers, textures and acceleration structures that any number of views share.
 
 use super::backend::Backend;
-use super::bvh_upload::{MeshTrees, TreeError, instance_tree};
+use super::bvh_upload::{MeshTree, MeshTrees, TreeError, instance_tree};
 use super::driver_structures::{self, DriverStructures};
 use super::frame_constants::FrameConstants;
 use super::history::Moving;
@@ -16,13 +16,14 @@ use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
 use crate::scene::entity_geometry::Placement;
 use crate::scene::motion::Motion;
+use crate::scene::polygons::{Polygon, PolygonError, Room};
 use crate::scene::records::{
     Instance, Light, MATERIAL_DIELECTRIC, MATERIAL_FILTER, MATERIAL_GLOSSY, NONE, TextureInfo,
 };
 use crate::scene::static_geometry::Mesh;
 use ash::vk;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use thiserror::Error;
 
 /// Why a scene cannot be put on the GPU or rendered there.
@@ -32,6 +33,8 @@ pub enum RenderError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Tree(#[from] TreeError),
+    #[error(transparent)]
+    Polygons(#[from] PolygonError),
     #[error("map \"{map}\" has {count} textures; this device can bind {most} at once")]
     Textures { map: String, count: usize, most: u32 },
 }
@@ -51,6 +54,15 @@ struct AmbientLayout {
     step: [f32; 3],
     size: [u32; 3],
     constant: [f32; 3],
+}
+
+/// Where the polygons of frames go.
+pub struct PolygonPlace {
+    pub room: Option<Room>,
+    /// Where their trees are.
+    pub tree: MeshTree,
+    /// Those that are there, as far as recorded commands have it.
+    pub there: Mutex<Vec<Polygon>>,
 }
 
 /// Buffers of the own traversal.
@@ -97,6 +109,9 @@ pub struct SceneGpu {
     /// Where meshes stand, and how they move.
     pub placements: Vec<Placement>,
     pub meshes: Vec<Mesh>,
+    pub polygons: PolygonPlace,
+    /// Flags of each material.
+    pub material_flags: Vec<u32>,
     pub instances: Buffer,
     pub instance_count: u32,
     pub lights: Buffer,
@@ -328,7 +343,9 @@ impl SceneGpu {
                 picture: scene.material_sources.iter().any(|m| m.program.animated),
                 lights: scene.material_sources.iter().any(|m| m.program.moving_emission)
                     || scene.lights.lights.iter().any(|l| l.instance != NONE),
-                geometry: scene.placements.iter().any(|p| p.motion.moves()) || !trees.dynamic.is_empty(),
+                geometry: scene.placements.iter().any(|p| p.motion.moves())
+                    || !trees.dynamic.is_empty()
+                    || g.polygons.is_some(),
             },
             has_player: scene
                 .placements
@@ -336,6 +353,12 @@ impl SceneGpu {
                 .any(|p| matches!(p.motion, Motion::Body(_) | Motion::View(_))),
             name: scene.name.clone(),
             placements: scene.placements.clone(),
+            polygons: PolygonPlace {
+                room: g.polygons,
+                tree: trees.polygons,
+                there: Mutex::new(Vec::new()),
+            },
+            material_flags: scene.materials.iter().map(|m| m.flags).collect(),
             meshes: scene.geometry.meshes.clone(),
             light_filters: scene.materials.iter().any(|m| m.flags & MATERIAL_FILTER != 0),
             branches_off: scene

@@ -5,6 +5,7 @@ use super::gbuffer::GBuffer;
 use super::guests::Guests;
 use super::history::FrameHistory;
 use super::moving::Moving;
+use super::polygons::Polygons;
 use super::reservoirs::Reservoirs;
 use super::secondary::SecondaryPixels;
 use super::strata::Strata;
@@ -33,6 +34,7 @@ pub struct ViewState {
     pub secondary_pixels: Option<SecondaryPixels>,
     pub strata: Strata,
     pub guests: Guests,
+    pub polygons: Polygons,
     pub history: FrameHistory,
     /// Made when a frame first shows a scene in which something moves.
     pub moving: Option<Moving>,
@@ -82,6 +84,7 @@ impl ViewState {
             secondary_pixels: None,
             strata: Strata::new(device, size)?,
             guests: Guests::default(),
+            polygons: Polygons::default(),
             history: FrameHistory::default(),
             moving: None,
             anti_aliased: false,

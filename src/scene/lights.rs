@@ -143,7 +143,7 @@ impl LightTable {
             let range = mesh.first_triangle..mesh.first_triangle + mesh.triangle_count;
             table.add_triangles(inputs, range, standing, inputs.geometry.dynamic.carrier(index) != 0);
         }
-        let rest = inputs.geometry.untraced_from..inputs.geometry.triangles.len() as u32;
+        let rest = inputs.geometry.untraced.clone();
         let world = Standing {
             pose: Affine3A::IDENTITY,
             mover: None,

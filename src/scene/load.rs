@@ -9,7 +9,9 @@ use super::light_cells::LightCells;
 use super::lights::{LightInputs, LightTable};
 use super::material::{MaterialSource, Tables};
 use super::models::Models;
+use super::motion::Motion;
 use super::player::{self, Player, Shelf};
+use super::polygons::Room;
 use super::portals;
 use super::records::{BspNode, Material, Portal};
 use super::spawns::{Spawn, spawns};
@@ -21,6 +23,7 @@ use crate::assets::image::Texture;
 use crate::assets::shader_script::ShaderLibrary;
 use crate::assets::vfs::search_path::map_path;
 use crate::assets::vfs::{FileSource, VfsError};
+use glam::Affine3A;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -40,6 +43,10 @@ pub enum SceneError {
 pub struct LoadOptions {
     /// Somebody who looks at it: a body for mirrors and a weapon before the eye.
     pub player: Option<Player>,
+    /// Triangles of polygons that frames may bring along.
+    pub polygons: u32,
+    /// Names of materials for them.
+    pub materials: Vec<String>,
 }
 
 /// A loaded map, ready for the tracers. World units, z up; radiance in luxel units.
@@ -152,6 +159,11 @@ impl Scene {
             .iter()
             .map(|s| MaterialSource::new(&s.name.text(), s.surface_flags, &scripts, &mut requests))
             .collect();
+        for name in &options.materials {
+            let mut made = MaterialSource::new(name, 0, &scripts, &mut requests);
+            made.of_model = true;
+            material_sources.push(made);
+        }
         let mut models = Models::default();
         let items = items::placed(&bsp, &entities);
         let mut item_models = Vec::new();
@@ -204,6 +216,9 @@ impl Scene {
         if geometry.meshes.is_empty() {
             warnings.push("the map has no world model: nothing is drawn".to_owned());
         }
+        if options.polygons > 0 {
+            geometry.polygons = Some(Room::add(&mut geometry, options.polygons));
+        }
         let mut placements = entity_geometry::placements(&bsp, &entities);
         let first_model = bsp.models.len() as u32;
         for (item, numbers) in items.iter().zip(item_models) {
@@ -211,6 +226,9 @@ impl Scene {
         }
         placements.extend(player.into_iter().map(|part| Placement::of_player(part, first_model)));
         geometry.dynamic.place(&mut placements);
+        if let Some(room) = geometry.polygons {
+            placements.push(Placement::new(room.mesh, Motion::Still(Affine3A::IDENTITY)));
+        }
         watch.lap("geometry");
         let worldspawn = entities.iter().find(|e| e.class() == "worldspawn");
         let far_plane = worldspawn

@@ -23,6 +23,7 @@ pub mod models;
 pub mod motion;
 pub mod optics;
 pub mod player;
+pub mod polygons;
 pub mod portals;
 pub mod program;
 pub mod records;

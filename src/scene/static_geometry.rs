@@ -3,12 +3,14 @@
 use super::dynamic_geometry::{Dynamic, DynamicPart, reach, swept};
 use super::material::{MaterialSource, Visibility};
 use super::models::Models;
+use super::polygons::Room;
 use super::records::{DEFORM_AUTOSPRITE, Deform, NONE, RestVertex, Triangle, VertexAttributes};
 use crate::assets::bsp::lumps::{SURFACE_FLARE, SURFACE_PATCH, Surface};
 use crate::assets::bsp::patch::{CURVATURE_BOUND, MeshVertex, tessellate};
 use crate::assets::bsp::{Bounds, Bsp};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The five geometry classes of the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -50,8 +52,10 @@ pub struct Geometry {
     /// `meshes[i]` is the map's model i, model 0 the world; then MD3 models; then the deforming parts of any of them.
     pub meshes: Vec<Mesh>,
     pub dynamic: Dynamic,
-    /// Triangles from here on belong to no mesh: emitters that rays do not meet.
-    pub untraced_from: u32,
+    /// Where a frame's own polygons go, if there is room for any.
+    pub polygons: Option<Room>,
+    /// Triangles that belong to no mesh: emitters that rays do not meet.
+    pub untraced: Range<u32>,
     /// Triangles dropped because they have no area.
     pub degenerate: u32,
 }
@@ -168,13 +172,14 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
         }
     }
     out.dynamic.vertices.end = out.positions.len() as u32;
-    out.untraced_from = out.triangles.len() as u32;
+    let untraced = out.triangles.len() as u32;
     for mesh in meshes {
         let material = mesh.material as usize;
         if materials[material].visibility == Visibility::Invisible && emits[material] {
             out.append(&mesh);
         }
     }
+    out.untraced = untraced..out.triangles.len() as u32;
     out
 }
 
