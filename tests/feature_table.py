@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Pictures of every feature of the shader language beside the raster original's.
 
-    feature_table.py --q3rays target/release/q3rays --original SCRIPT --out docs/features
+    feature_table.py --q3rays target/release/q3rays --out docs/features
 
 For each feature that `q3rays info MAP --views` knows, a map is chosen (of those that have it the one that has been chosen
 least, by name), the view that it names is rendered, and the part of it around the surface is put beside the same part of the
-original's picture. SCRIPT is called as `SCRIPT MAP "X Y Z YAW" OUT.png lit WxH`, with the place that `setviewpos` is given. Writes one picture per feature and README.md with the table. Needs Pillow.
+original's picture. Writes one picture per feature and README.md with the table. Needs Pillow, and what original_view.sh needs.
 """
 
 import argparse
@@ -21,9 +21,10 @@ from PIL import Image
 SIZE = (640, 360)
 CROP = (240, 180)
 EYE_HEIGHT = 26
-# `setviewpos` lifts the player by a unit and throws them forward; noclip's friction stops them this many units on.
+# Where `setviewpos` leaves the eye: see albedo_original.py.
 LIFT = 1
-THROWN = 26.4
+THROWN = 36.089
+ORIGINAL = pathlib.Path(__file__).parent / "original_view.sh"
 
 
 def views(program, name):
@@ -60,7 +61,6 @@ def crop(path, at):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--q3rays", required=True)
-    parser.add_argument("--original", required=True)
     parser.add_argument("--out", required=True, type=pathlib.Path)
     parser.add_argument("--spp", default="48")
     parser.add_argument("--only", nargs="*", help="features to make pictures of; the others keep theirs")
@@ -81,7 +81,7 @@ def main():
             subprocess.run([args.q3rays, "render", name, "--backend", "cpu", f"--camera={x},{y},{z},0,{view['yaw']}", "--size",
                             size, "--spp", args.spp, "--time", "1", "--player", "sarge", "+set", "cg_drawGun", "0",
                             "--out", ours], check=True, capture_output=True)
-            subprocess.run(["bash", args.original, name, " ".join(map(str, [*origin, view["yaw"]])), original, "lit", size],
+            subprocess.run(["bash", ORIGINAL, name, " ".join(map(str, [*origin, view["yaw"]])), original, "lit", size],
                            check=True, stdin=subprocess.DEVNULL, capture_output=True)
             pair = Image.new("RGB", (2 * CROP[0] + 4, CROP[1]), "white")
             pair.paste(crop(ours, view["at"]), (0, 0))

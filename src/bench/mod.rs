@@ -9,3 +9,4 @@ pub mod ray_buffers;
 pub mod ray_report;
 pub mod rays;
 pub mod references;
+pub mod structures;

@@ -10,6 +10,7 @@ use crate::bench::lights_plot;
 use crate::bench::lights_report::LightsReport;
 use crate::bench::ray_report::{MOST_DISAGREEMENT, RaysReport};
 use crate::bench::rays::{EYE_JITTER, RaysBench, RaysOptions};
+use crate::bench::structures::{StructuresReport, measure};
 use crate::console::Cvars;
 use crate::console::settings::settings;
 use crate::engine::Engine;
@@ -33,6 +34,8 @@ enum What {
     Rays(RaysArgs),
     /// Error against time of the ways to choose a light
     Lights(LightsArgs),
+    /// What acceleration structures cost to build, refit and upload
+    Structures(StructuresArgs),
     /// What the denoiser makes of one light sample per pixel, and its times
     Denoiser(DenoiserArgs),
 }
@@ -54,6 +57,16 @@ struct RaysArgs {
     /// Quality of the own trees
     #[arg(long, default_value = "balanced")]
     trees: Trees,
+    /// Also write the figures as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+struct StructuresArgs {
+    /// Map names
+    #[arg(default_values = DEFAULT_MAPS)]
+    maps: Vec<String>,
     /// Also write the figures as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -139,6 +152,7 @@ pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
     match &args.what {
         What::Rays(args) => rays(common, cvars, args),
         What::Lights(args) => lights(common, cvars, args),
+        What::Structures(args) => structures(common, cvars, args),
         What::Denoiser(args) => denoiser(common, cvars, args),
     }
 }
@@ -223,6 +237,34 @@ fn lights(common: &Common, cvars: &Cvars, args: &LightsArgs) -> CliResult {
     if let Some(path) = &args.plot {
         let text = lights_plot::svg(&report).map_err(CliError::failed)?;
         atomic::write(path, text.as_bytes()).map_err(CliError::failed)?;
+    }
+    stdout::line(&report).map_err(CliError::failed)
+}
+
+fn structures(common: &Common, cvars: &Cvars, args: &StructuresArgs) -> CliResult {
+    if let Some(path) = &args.json {
+        atomic::create_parent(path).map_err(CliError::failed)?;
+    }
+    let Engine::Vulkan { device, .. } = common.engine(cvars)? else {
+        return Err(CliError::Failed(
+            "bench structures measures Vulkan devices; there is none".to_owned(),
+        ));
+    };
+    let backend = StructuresReport::backend(device.has_ray_query());
+    let mut report = StructuresReport {
+        device: device.info().name.clone(),
+        driver: device.info().driver.clone(),
+        maps: Vec::new(),
+    };
+    for map in &args.maps {
+        let scene = common.scene(map)?;
+        let gpu = SceneGpu::new(&device, &scene, backend, BvhQuality::Balanced).map_err(CliError::failed)?;
+        report.maps.push(measure(&scene, &gpu).map_err(CliError::failed)?);
+        // What is measured is kept, also where a later map fails.
+        if let Some(path) = &args.json {
+            let text = serde_json::to_string_pretty(&report).map_err(CliError::failed)?;
+            atomic::write(path, text.as_bytes()).map_err(CliError::failed)?;
+        }
     }
     stdout::line(&report).map_err(CliError::failed)
 }

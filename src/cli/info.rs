@@ -72,6 +72,13 @@ impl Display for Text<'_> {
             "triangles", r.triangles, r.degenerate_triangles, r.meshes, r.placements
         )?;
         list(f, "geometry", &r.geometry)?;
+        if let Some(growth) = r.deform_box_growth {
+            writeln!(
+                f,
+                "{:12} boxes that hold deforming triangles at all times have {growth:.2} times the area of those at rest",
+                ""
+            )?;
+        }
         let vis = if r.vised {
             ""
         } else {

@@ -11,6 +11,7 @@ use super::entity_geometry::Placement;
 use super::program::wave_at;
 use super::program::wave_record;
 use super::records::*;
+use super::static_geometry::Geometry;
 use crate::assets::shader_script::Deform as Script;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -109,6 +110,23 @@ impl Dynamic {
     /// Mesh that a mesh is a part of, or itself.
     pub fn carrier(&self, mesh: usize) -> usize {
         self.part(mesh).map_or(mesh, |p| p.carrier as usize)
+    }
+
+    /// Area of the boxes that hold the triangles at all times over that of the boxes of the triangles at rest; `None` where
+    /// nothing deforms.
+    pub fn box_growth(&self, geometry: &Geometry) -> Option<f64> {
+        let area = |size: Vec3| f64::from(size.x * size.y + size.y * size.z + size.z * size.x);
+        let (mut swept, mut rest) = (0.0, 0.0);
+        for part in &self.parts {
+            let first = geometry.meshes[part.mesh as usize].first_triangle;
+            for (t, [min, max]) in (first..).zip(&part.boxes) {
+                let [a, b, c] = geometry.corners(t);
+                swept += area(*max - *min);
+                // A unit of thickness keeps flat ones from having no area.
+                rest += area(a.max(b).max(c) - a.min(b).min(c) + Vec3::ONE);
+            }
+        }
+        (rest > 0.0).then(|| swept / rest)
     }
 
     /// Places parts wherever their carriers are. Sprites of a carrier that stands in several places look at the eye as its first

@@ -34,6 +34,9 @@ pub struct Report {
     pub degenerate_triangles: u32,
     /// Triangles per geometry class.
     pub geometry: BTreeMap<String, u32>,
+    /// How much larger the boxes of deforming triangles are than the triangles at rest, by area: what watches over the quality of
+    /// their trees, which are never refitted.
+    pub deform_box_growth: Option<f64>,
     pub meshes: usize,
     pub placements: usize,
     pub clusters: u32,
@@ -145,6 +148,7 @@ impl Report {
             triangles: scene.geometry.triangles.len(),
             degenerate_triangles: scene.geometry.degenerate,
             geometry,
+            deform_box_growth: scene.geometry.dynamic.box_growth(&scene.geometry),
             meshes: scene.geometry.meshes.len(),
             placements: scene.placements.len(),
             clusters: scene.clusters.count,
