@@ -35,6 +35,7 @@ fn input(camera: &Camera, settings: &Settings, index: u32) -> FrameInput<'static
         settings: *settings,
         lights: &[],
         polygons: &[],
+        entities: &[],
         sample_index: index,
         accumulated: 0,
         exposure_blend: 1.0,

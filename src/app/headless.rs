@@ -107,6 +107,7 @@ pub fn run_frames(
             },
             lights: &[],
             polygons: &[],
+            entities: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

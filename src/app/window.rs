@@ -1,12 +1,14 @@
-//! The window: fly through a map.
+//! The window: walk through a map.
 
-use super::fly_camera::fly;
 use super::input::Input;
+use super::walk::{enter, walk};
 use crate::cli::CliError;
 use crate::console::Cvars;
 use crate::console::cvars::VIEWS;
 use crate::console::settings::settings;
 use crate::engine::{BackendChoice, open_device};
+use crate::game::movement::Mode;
+use crate::game::play::Play;
 use crate::gpu::{Access, Instance, InstanceOptions, PresentMode, SubmitSync, Surface, Swapchain, Use, ValidationMode};
 use crate::output::stats::{FrameStats, Summary};
 use crate::render::frame::FrameInput;
@@ -17,7 +19,6 @@ use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
 use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
-use crate::scene::spawns::first_view;
 use ash::vk;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -33,8 +34,8 @@ use winit::window::{CursorGrabMode, Fullscreen, Window, WindowId};
 /// First size of the window's inside on GPUs, and on CPU-type devices, which are far slower.
 const SIZE: (u32, u32) = (1280, 720);
 const SMALL_SIZE: (u32, u32) = (640, 360);
-/// Longest time that one frame may move the camera by, seconds.
-const LONGEST_STEP: f32 = 0.1;
+/// Longest time that one frame lets go by, seconds.
+const LONGEST_STEP: f32 = 0.25;
 /// Share of the way to the wanted exposure per second.
 const EXPOSURE_RATE: f32 = 2.0;
 /// Frames in the title's statistics.
@@ -91,6 +92,7 @@ struct Shown {
     realtime: Realtime,
     window: Arc<Window>,
     input: Input,
+    play: Play,
     camera: Camera,
     captured: bool,
     last_frame: Instant,
@@ -142,12 +144,13 @@ impl Shown {
         let realtime =
             Realtime::new(Arc::new(scene), (size.width.max(1), size.height.max(1)), None).map_err(CliError::failed)?;
         let fov = options.cvars.number("cg_fov") as f32;
-        let camera = first_view(&options.scene.spawns, &options.scene.bsp, fov);
+        let (play, camera) = enter(&options.scene, fov);
         Ok(Self {
             swapchain,
             realtime,
             window,
             input: Input::default(),
+            play,
             camera,
             captured: false,
             last_frame: Instant::now(),
@@ -179,12 +182,21 @@ impl Shown {
     fn draw(&mut self, cvars: &Cvars) -> Result<(), CliError> {
         let seconds = self.last_frame.elapsed().as_secs_f32().min(LONGEST_STEP);
         self.last_frame = Instant::now();
-        let moved = fly(
+        let accumulate = cvars.number("rt_accumulate") != 0.0 || cvars.number("rt_refine") != 0.0;
+        let frozen = accumulate || cvars.number("rt_pause") != 0.0;
+        let scale = if frozen { 1.0 } else { cvars.number("timescale") };
+        if !frozen {
+            self.time += f64::from(seconds) * scale;
+        }
+        let moved = walk(
+            &mut self.play,
             &mut self.camera,
             &mut self.input,
             cvars.number("sensitivity") as f32,
-            seconds,
+            seconds * scale as f32,
+            (Clock::from_seconds(self.time), frozen),
         );
+        let entities = self.play.states();
         let size = self.window.inner_size();
         if size.width == 0 || size.height == 0 {
             std::thread::sleep(IDLE);
@@ -194,10 +206,6 @@ impl Shown {
         self.realtime
             .resize((size.width, size.height))
             .map_err(CliError::failed)?;
-        let accumulate = cvars.number("rt_accumulate") != 0.0 || cvars.number("rt_refine") != 0.0;
-        if !accumulate && cvars.number("rt_pause") == 0.0 {
-            self.time += f64::from(seconds) * cvars.number("timescale");
-        }
         let still = accumulate && !moved && before == (size.width, size.height);
         self.accumulated = if still { self.accumulated + 1 } else { 0 };
         let now = Settings {
@@ -213,6 +221,7 @@ impl Shown {
             },
             lights: &[],
             polygons: &[],
+            entities: &entities,
             sample_index: self.frame,
             accumulated: self.accumulated,
             exposure_blend: (EXPOSURE_RATE * seconds).min(1.0),
@@ -265,9 +274,15 @@ impl Shown {
         } else {
             String::new()
         };
+        let way = match self.play.body.mode {
+            Mode::Walk => "walk",
+            Mode::Fly => "fly",
+            Mode::NoClip => "noclip",
+        };
+        let health = self.play.health.ceil();
         self.window.set_title(&format!(
-            "q3rays - {map} - {:.1} ms (95% {:.1}) - view {view}{samples} - WASD fly, mouse look, 0-9 views, P refine, \
-             Esc quits",
+            "q3rays - {map} - {:.1} ms (95% {:.1}) - {way} - health {health} - view {view}{samples} - WASD move, Space jump, C crouch, \
+             N noclip, mouse look, 0-9 views, P refine, Esc quits",
             s.p50, s.p95
         ));
         if cvars.number("rt_printPerfStats") != 0.0
@@ -329,6 +344,14 @@ impl App {
                 event_loop.exit();
                 return;
             }
+            KeyCode::KeyN => {
+                let body = &mut shown.play.body;
+                body.mode = match body.mode {
+                    Mode::NoClip => Mode::Walk,
+                    _ => Mode::NoClip,
+                };
+                return;
+            }
             KeyCode::KeyP => Some(("rt_refine", u32::from(toggled).to_string())),
             _ => DIGITS
                 .iter()
@@ -369,8 +392,11 @@ impl ApplicationHandler for App {
                 ..
             } => shown.capture(true),
             WindowEvent::KeyboardInput { event, .. } => {
-                if let PhysicalKey::Code(code) = event.physical_key {
-                    self.key(event_loop, code, event.state == ElementState::Pressed && !event.repeat);
+                // A held key repeats: it is down already.
+                if let PhysicalKey::Code(code) = event.physical_key
+                    && !event.repeat
+                {
+                    self.key(event_loop, code, event.state == ElementState::Pressed);
                 }
             }
             _ => {}

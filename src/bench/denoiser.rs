@@ -108,6 +108,7 @@ impl DenoiserBench {
             settings: *settings,
             lights: &[],
             polygons: &[],
+            entities: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -210,6 +210,7 @@ impl LightsBench {
             settings: *settings,
             lights: &[],
             polygons: &[],
+            entities: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -8,7 +8,7 @@ use crate::scene::bvh::build_cwbvhs;
 use crate::scene::camera::Camera;
 use crate::scene::clock::Clock;
 use crate::scene::dynamic_geometry::{self, Moved};
-use crate::scene::entity_geometry::Placement;
+use crate::scene::entity_geometry::{EntityState, Placement, apply};
 use crate::scene::guests::{GUEST_LIGHT, guests};
 use crate::scene::motion::Moment;
 use crate::scene::records::{
@@ -49,6 +49,8 @@ pub struct Tracer {
     pub glossy: bool,
     /// Lights beside the map's: [`crate::scene::guests`].
     pub guests: Vec<Light>,
+    /// Entities that are not as the map has them.
+    pub states: Vec<EntityState>,
     /// Light of each triangle, or [`NONE`].
     lights: Arc<Vec<u32>>,
     /// Dynamic vertices at the moment.
@@ -75,9 +77,11 @@ impl Wanted<'_> {
     }
 }
 
-fn instances(scene: &Scene, moment: &Moment) -> Vec<Instance> {
+fn instances(scene: &Scene, moment: &Moment, states: &[EntityState]) -> Vec<Instance> {
     let record = |p: &Placement| p.record(&scene.geometry.meshes, moment, moment);
-    scene.placements.iter().map(record).collect()
+    let mut records: Vec<Instance> = scene.placements.iter().map(record).collect();
+    apply([states, states], &scene.placements, &mut records);
+    records
 }
 
 /// What is between two points.
@@ -132,12 +136,13 @@ pub fn point_to_world(instance: &Instance, p: Vec3) -> Vec3 {
 impl Tracer {
     /// Builds the trees of a scene.
     pub fn new(scene: &Scene) -> Self {
-        let instances = instances(scene, &Clock::default().into());
+        let instances = instances(scene, &Clock::default().into(), &[]);
         Self {
             trees: Arc::new(build_cwbvhs(&scene.geometry)),
             clock: Clock::default(),
             glossy: false,
             guests: Vec::new(),
+            states: Vec::new(),
             lights: Arc::new(scene.lights.of_triangles(scene.geometry.triangles.len())),
             moved: dynamic_geometry::all(scene, &instances, Clock::default(), Vec3::ZERO),
             instances,
@@ -147,12 +152,13 @@ impl Tracer {
     /// The same scene at another moment, seen by `camera`.
     pub fn at(&self, scene: &Scene, settings: &Settings, camera: &Camera) -> Self {
         let (clock, eye) = (settings.clock, camera.eye.into());
-        let instances = instances(scene, &settings.moment(camera));
+        let instances = instances(scene, &settings.moment(camera), &self.states);
         Self {
             trees: self.trees.clone(),
             clock,
             glossy: settings.reflects(),
             guests: guests(&self.guests, camera, settings.flashlight),
+            states: self.states.clone(),
             lights: self.lights.clone(),
             moved: dynamic_geometry::all(scene, &instances, clock, eye),
             instances,

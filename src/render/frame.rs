@@ -24,6 +24,7 @@ use super::tone_map::ToneMap;
 use super::view_state::ViewState;
 use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps};
 use crate::scene::camera::Camera;
+use crate::scene::entity_geometry::EntityState;
 use crate::scene::guests::guests;
 use crate::scene::polygons::Polygon;
 use crate::scene::records::Light;
@@ -42,6 +43,8 @@ pub struct FrameInput<'a> {
     pub lights: &'a [Light],
     /// Polygons that are in this frame: [`crate::scene::polygons`].
     pub polygons: &'a [Polygon],
+    /// Entities that are not as the map has them: doors on their way, items that were taken.
+    pub entities: &'a [EntityState],
     /// Number of the sample that every pixel takes.
     pub sample_index: u32,
     /// Samples accumulated with this one; 0 shows this frame alone.
@@ -142,20 +145,26 @@ impl FrameRenderer {
         view.anti_aliased = input.anti_aliases();
         let constants = frame_constants(scene, view, slot, input)?;
         let mut constants = {
-            let revision = scene.revision().wrapping_add(view.guests.revision);
+            if view.entities.0 != input.entities {
+                view.entities = (input.entities.to_vec(), view.entities.1.wrapping_add(1));
+            }
+            let revision = scene
+                .revision()
+                .wrapping_add(view.guests.revision)
+                .wrapping_add(view.entities.1);
             view.history.advance(constants, input, revision, scene.moving)
         };
         let polygons = view
             .polygons
             .record(cmd, &mut view.tracker, scene, slot, input.polygons)?;
-        if scene.moving.geometry {
+        if scene.moving.geometry || view.moving.is_some() || !input.entities.is_empty() {
             let moving = match view.moving.take() {
                 Some(made) => made,
                 None => Moving::new(scene, view.constants.len())?,
             };
             let moving = view.moving.insert(moving);
             let now = input.settings.moment(&input.camera);
-            constants = moving.advance(scene, slot, now, polygons, constants)?;
+            constants = moving.advance(scene, slot, now, polygons, input.entities, constants)?;
         }
         let reuses = input.reuses();
         if reuses {

@@ -96,6 +96,7 @@ impl<'a> GpuRenderer<'a> {
             settings: *settings,
             lights: &[],
             polygons: &[],
+            entities: &[],
             sample_index: index,
             accumulated,
             exposure_blend: 1.0,

@@ -6,6 +6,7 @@ use super::frame_constants::FrameConstants;
 use super::scene_gpu::SceneGpu;
 use crate::gpu::acceleration::{TopInstance, TopLevel};
 use crate::gpu::{Access, Buffer, Commands, DescriptorSets, GpuError, MemoryKind, Tracker, Use, Write};
+use crate::scene::entity_geometry::{EntityState, apply};
 use crate::scene::motion::Moment;
 use crate::scene::records::Instance;
 use crate::scene::static_geometry::Mesh;
@@ -21,6 +22,7 @@ pub struct Moving {
     /// What the frame's top level is made of.
     placed: Vec<TopInstance>,
     before: Option<Moment>,
+    states: Vec<EntityState>,
 }
 
 impl Moving {
@@ -53,10 +55,12 @@ impl Moving {
             top,
             placed: Vec::new(),
             before: None,
+            states: Vec::new(),
         })
     }
 
-    /// Writes a frame's instances and tells its constants. `polygons`: their mesh.
+    /// Writes a frame's instances and tells its constants. `polygons`: their mesh; `states`: of entities that are not
+    /// as the map has them.
     ///
     /// # Errors
     /// [`GpuError`] of the device.
@@ -66,6 +70,7 @@ impl Moving {
         slot: usize,
         now: Moment,
         polygons: Option<Mesh>,
+        states: &[EntityState],
         constants: FrameConstants,
     ) -> Result<FrameConstants, GpuError> {
         let before = self.before.replace(now).unwrap_or(now);
@@ -73,11 +78,16 @@ impl Moving {
         if let (Some(mesh), Some(room)) = (polygons, scene.polygons.room) {
             meshes.to_mut()[room.mesh as usize] = mesh;
         }
-        let records: Vec<Instance> = scene
+        let mut records: Vec<Instance> = scene
             .placements
             .iter()
             .map(|p| p.record(&meshes, &now, &before))
             .collect();
+        apply([states, &self.states], &scene.placements, &mut records);
+        let changed = self.states != states;
+        if changed {
+            self.states = states.to_vec();
+        }
         let tree = instance_tree(&meshes, &records, &scene.name).map_err(|e| GpuError::InvalidInput(e.to_string()))?;
         let count = if tree.is_some() {
             records.len()
@@ -97,7 +107,9 @@ impl Moving {
             instance_nodes: self.nodes[slot].address(),
             instance_count: count,
             instance_root: tree.root,
-            moving: u32::from(before.clock != now.clock || (scene.has_player && before.camera != now.camera)),
+            moving: u32::from(
+                changed || before.clock != now.clock || (scene.has_player && before.camera != now.camera),
+            ),
             ..constants
         })
     }

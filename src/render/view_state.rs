@@ -11,6 +11,7 @@ use super::secondary::SecondaryPixels;
 use super::strata::Strata;
 use crate::gpu::{Buffer, DescriptorLayout, Device, GpuError, MemoryKind, Tracker};
 use crate::reference::direct::RayCounts;
+use crate::scene::entity_geometry::EntityState;
 use ash::vk;
 use std::sync::Arc;
 
@@ -35,6 +36,8 @@ pub struct ViewState {
     pub strata: Strata,
     pub guests: Guests,
     pub polygons: Polygons,
+    /// Entities of the frame before that were not as the map has them, and how often that has changed.
+    pub entities: (Vec<EntityState>, u32),
     pub history: FrameHistory,
     /// Made when a frame first shows a scene in which something moves.
     pub moving: Option<Moving>,
@@ -85,6 +88,7 @@ impl ViewState {
             strata: Strata::new(device, size)?,
             guests: Guests::default(),
             polygons: Polygons::default(),
+            entities: (Vec::new(), 0),
             history: FrameHistory::default(),
             moving: None,
             anti_aliased: false,

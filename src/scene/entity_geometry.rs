@@ -5,7 +5,7 @@ use super::items::PlacedItem;
 use super::models::Models;
 use super::motion::{Moment, Motion, step};
 use super::player::Part;
-use super::records::{Instance, SEEN_BY_ALL};
+use super::records::{Instance, NONE, SEEN_BY_ALL};
 use super::static_geometry::Mesh;
 use crate::assets::bsp::Bsp;
 use crate::assets::entities::Entity;
@@ -25,6 +25,49 @@ pub struct Placement {
     pub seen_by: u32,
     /// Meshes that it is shown by when it is small, the most detailed first.
     pub less_detailed: Vec<u32>,
+    /// Number of the entity that places it, or [`NONE`].
+    pub entity: u32,
+}
+
+/// How an entity is otherwise than the map and the clock have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EntityState {
+    /// Its number in the map's list.
+    pub entity: u32,
+    /// How far it has moved, world space.
+    pub offset: Vec3,
+    /// It is not there.
+    pub hidden: bool,
+}
+
+/// Instances as some entities' states have them, `now` and in the frame `before`.
+pub fn apply(states: [&[EntityState]; 2], placements: &[Placement], records: &mut [Instance]) {
+    let [now, before] = states;
+    if now.is_empty() && before.is_empty() {
+        return;
+    }
+    for (placement, record) in placements.iter().zip(records) {
+        let of = |states: &[EntityState]| states.iter().find(|s| s.entity == placement.entity).copied();
+        let (now, before) = (of(now), of(before));
+        if placement.entity == NONE || (now.is_none() && before.is_none()) {
+            continue;
+        }
+        let offset = |state: Option<EntityState>| state.map_or(Vec3::ZERO, |s| s.offset);
+        let (shift, old) = (offset(now), offset(before));
+        let back = record
+            .world_to_object
+            .map(|row| Vec3::new(row[0], row[1], row[2]).dot(shift));
+        for axis in 0..3 {
+            record.object_to_world[axis][3] += shift[axis];
+            record.old_object_to_world[axis][3] += old[axis];
+            record.world_to_object[axis][3] -= back[axis];
+        }
+        record.identity &= u32::from(shift == Vec3::ZERO);
+        record.moves |= u32::from(shift != old);
+        if now.is_some_and(|s| s.hidden) {
+            record.seen_by = 0;
+        }
+    }
 }
 
 impl Placement {
@@ -37,6 +80,7 @@ impl Placement {
             motion,
             seen_by: SEEN_BY_ALL,
             less_detailed: Vec::new(),
+            entity: NONE,
         }
     }
 
@@ -49,6 +93,7 @@ impl Placement {
             motion: part.motion,
             seen_by: part.seen_by,
             less_detailed: Vec::new(),
+            entity: NONE,
         }
     }
 }
@@ -59,7 +104,7 @@ pub fn placements(bsp: &Bsp, entities: &[Entity]) -> Vec<Placement> {
     if !bsp.models.is_empty() {
         out.push(Placement::new(0, Motion::Still(Affine3A::IDENTITY)));
     }
-    for entity in entities {
+    for (number, entity) in (0u32..).zip(entities) {
         let model = entity.get("model").and_then(|m| m.strip_prefix('*'));
         let Some(mesh) = model.and_then(|m| m.parse::<u32>().ok()) else {
             continue;
@@ -68,10 +113,10 @@ pub fn placements(bsp: &Bsp, entities: &[Entity]) -> Vec<Placement> {
             continue;
         };
         let (mins, maxs) = (Vec3::from(model.mins), Vec3::from(model.maxs));
-        out.push(Placement::new(
-            mesh,
-            Motion::of_brush_model(entity, entities, mins, maxs),
-        ));
+        out.push(Placement {
+            entity: number,
+            ..Placement::new(mesh, Motion::of_brush_model(entity, entities, mins, maxs))
+        });
     }
     out
 }
@@ -109,6 +154,7 @@ pub fn item_placements(item: &PlacedItem, numbers: [Option<u32>; 2], models: &Mo
         let less_detailed = models.less_detailed(number);
         Some(Placement {
             less_detailed: less_detailed.iter().map(|n| first + n).collect(),
+            entity: item.number,
             ..Placement::new(first + number, item.motion(i == 1, models.middle(number)))
         })
     };

@@ -338,7 +338,7 @@ impl Motion {
 }
 
 /// Unit direction that a door opens to: `angle` −1 is up, −2 down.
-fn door_way(entity: &Entity) -> Vec3 {
+pub fn door_way(entity: &Entity) -> Vec3 {
     match entity.number("angle").unwrap_or(0.0) {
         -1.0 => Vec3::Z,
         -2.0 => Vec3::NEG_Z,

@@ -1,0 +1,268 @@
+//! Moving about in real maps: traces against brute force, nobody leaves the world, doors, jump pads and teleporters.
+
+mod common;
+
+use common::installed;
+use glam::Vec3;
+use q3rays::assets::bsp::Bsp;
+use q3rays::assets::bsp::lumps::content_flags;
+use q3rays::assets::entities::{Entity, parse};
+use q3rays::assets::vfs::FileSource;
+use q3rays::assets::vfs::search_path::map_path;
+use q3rays::game::collision::{CollisionWorld, Extent, PLAYER_SOLID};
+use q3rays::game::movement::{Command, STEP, extent};
+use q3rays::game::play::{Event, Play};
+use q3rays::scene::clock::Clock;
+use q3rays::scene::sampling::{key, unit};
+use q3rays::scene::spawns::spawns;
+
+const MAPS: [&str; 10] = [
+    "oa_dm1",
+    "am_galmevish2",
+    "ctf_compromise",
+    "oa_minia",
+    "kaos",
+    "wrackdm17",
+    "slimefac",
+    "oa_koth2",
+    "aggressor",
+    "oa_rpg3dm2",
+];
+
+fn map(name: &str) -> (Bsp, Vec<Entity>) {
+    let files = installed();
+    let bytes = files
+        .read(&map_path(name))
+        .unwrap()
+        .unwrap_or_else(|| panic!("no map {name}"));
+    let bsp = Bsp::read(&bytes).unwrap();
+    let entities = parse(&bsp.entities).0;
+    (bsp, entities)
+}
+
+fn play(name: &str) -> Play {
+    let (bsp, entities) = map(name);
+    Play::new(&bsp, &entities, &spawns(&entities))
+}
+
+/// Numbers 0..1.
+fn random(map: usize, i: u32, d: u32) -> f32 {
+    unit(key(map as u32 + 1, i, d))
+}
+
+#[test]
+fn traces_through_the_tree_are_those_against_everything() {
+    let sizes = [extent(false), extent(true), Extent::POINT];
+    for (number, name) in MAPS.iter().enumerate() {
+        let (bsp, _) = map(name);
+        let world = CollisionWorld::new(&bsp);
+        let bounds = bsp.world_bounds();
+        let (mut hits, mut apart) = (0, 0);
+        for i in 0..10_000 {
+            let at = |d: u32| Vec3::new(random(number, i, d), random(number, i, d + 1), random(number, i, d + 2));
+            let start = bounds.min + (bounds.max - bounds.min) * at(0);
+            let way = (at(3) - 0.5) * if i % 2 == 0 { 64.0 } else { 2048.0 };
+            let size = sizes[i as usize % 3];
+            let tree = world.sweep(size, start, start + way, PLAYER_SOLID, &[]);
+            let all = world.sweep_all(size, start, start + way, PLAYER_SOLID);
+            assert_eq!(tree.start_solid, all.start_solid, "{name} {i}");
+            hits += u32::from(all.fraction < 1.0);
+            // Of two things met at once either may be told.
+            apart += u32::from(tree.end.distance(all.end) > 1.0 / 32.0);
+            // It ends free, if it began so.
+            if !tree.start_solid && tree.fraction > 0.0 {
+                let again = world.sweep(size, tree.end, tree.end, PLAYER_SOLID, &[]);
+                assert!(!again.all_solid, "{name} {i}: ends in something solid");
+            }
+        }
+        assert_eq!(apart, 0, "{name}");
+        assert!(hits > 1000, "{name}: {hits} of 10000 meet anything");
+    }
+}
+
+/// Ten minutes of random keys on each of ten maps: the body is never in a wall, nor out of the map.
+#[test]
+fn nobody_leaves_the_world() {
+    const STEPS: u32 = 75_000;
+    for (number, name) in MAPS.iter().enumerate() {
+        let mut play = play(name);
+        let mut events = Vec::new();
+        let mut command = Command::default();
+        let (mut farthest, start, mut deaths) = (0f32, play.body.origin, 0);
+        for i in 0..STEPS {
+            if i % 40 == 0 {
+                let r = |d: u32| random(number, i, d);
+                command = Command {
+                    forward: if r(0) < 0.85 { 1.0 } else { -1.0 },
+                    right: (r(1) * 3.0).floor() - 1.0,
+                    up: match r(2) {
+                        u if u < 0.5 => 0.0,
+                        u if u < 0.9 => 1.0,
+                        _ => -1.0,
+                    },
+                    pitch: r(3) * 60.0 - 30.0,
+                    yaw: command.yaw + (r(4) - 0.5) * 180.0,
+                    fast: false,
+                };
+            }
+            events.clear();
+            play.step(
+                Clock::from_seconds(f64::from(i) * f64::from(STEP)),
+                &command,
+                &mut events,
+            );
+            deaths += events.iter().filter(|e| **e == Event::Died).count();
+            let at = play.body.origin;
+            assert!(at.is_finite() && play.body.velocity.is_finite(), "{name} step {i}");
+            if i % 16 == 0 {
+                let inside = play.collision.contents(at, play.placed()) & content_flags::SOLID;
+                assert_eq!(inside, 0, "{name} step {i}: in solid at {at}");
+            }
+            farthest = farthest.max(at.distance(start));
+        }
+        println!("{name}: {farthest:.0} units from the spawn at most, {deaths} deaths");
+        assert!(farthest > 300.0, "{name}: {farthest}");
+        assert!(deaths < 400, "{name}: {deaths} deaths");
+    }
+}
+
+/// Every jump pad of the maps throws towards its target: the flight's top is there, where nothing is in between.
+#[test]
+fn jump_pads_throw_to_their_targets() {
+    let (mut pads, mut reached) = (0, 0);
+    for name in MAPS {
+        let (bsp, entities) = map(name);
+        for e in entities.iter().filter(|e| e.class() == "trigger_push") {
+            let number: usize = e.get("model").unwrap()[1..].parse().unwrap();
+            let Some(target) = entities
+                .iter()
+                .find(|t| t.get("targetname").is_some() && t.get("targetname") == e.get("target"))
+            else {
+                continue;
+            };
+            let m = &bsp.models[number];
+            let middle = (Vec3::from(m.mins) + Vec3::from(m.maxs)) * 0.5;
+            let mut play = Play::new(&bsp, &entities, &spawns(&entities));
+            // Feet just inside.
+            play.body.origin = Vec3::new(middle.x, middle.y, m.maxs[2] + 23.0);
+            let mut nearest = f32::MAX;
+            for i in 0..400 {
+                play.step(
+                    Clock::from_seconds(f64::from(i) * 0.008),
+                    &Command::default(),
+                    &mut Vec::new(),
+                );
+                nearest = nearest.min(play.body.origin.distance(target.origin()));
+            }
+            pads += 1;
+            reached += u32::from(nearest < 48.0);
+        }
+    }
+    assert!(pads >= 20, "{pads} pads");
+    assert!(
+        reached * 10 >= pads * 9,
+        "{reached} of {pads} flights reach their target"
+    );
+}
+
+#[test]
+fn teleporters_put_one_at_their_destination() {
+    let mut found = 0;
+    for name in MAPS {
+        let (bsp, entities) = map(name);
+        for e in entities
+            .iter()
+            .filter(|e| e.class() == "trigger_teleport" && e.spawnflags() & 1 == 0)
+        {
+            let number: usize = e.get("model").unwrap()[1..].parse().unwrap();
+            let Some(there) = entities
+                .iter()
+                .find(|t| t.get("targetname").is_some() && t.get("targetname") == e.get("target"))
+            else {
+                continue;
+            };
+            let m = &bsp.models[number];
+            let mut play = Play::new(&bsp, &entities, &spawns(&entities));
+            play.body.origin = (Vec3::from(m.mins) + Vec3::from(m.maxs)) * 0.5;
+            let mut events = Vec::new();
+            play.step(Clock::default(), &Command::default(), &mut events);
+            assert!(events.contains(&Event::Teleported), "{name}");
+            let wanted = there.number("angle").unwrap_or(0.0);
+            assert!(events.contains(&Event::Turned(wanted)), "{name}: {events:?}");
+            assert!(play.body.origin.distance(there.origin()) < 2.0, "{name}");
+            assert!((play.body.velocity.length() - 400.0).abs() < 10.0, "{name}");
+            found += 1;
+        }
+    }
+    assert!(found >= 8, "{found}");
+}
+
+/// The sliding door of `showcase` opens for who comes, lets them through and closes behind them.
+#[test]
+fn doors_open_for_those_who_come() {
+    let mut play = play("showcase");
+    let door = play.movers[0].clone();
+    let middle = play.collision.bounds(door.model).unwrap().centre();
+    play.body.origin = Vec3::new(middle.x + 200.0, middle.y, 25.0);
+    let go = Command {
+        forward: 1.0,
+        yaw: 180.0,
+        ..Command::default()
+    };
+    let mut events = Vec::new();
+    let mut highest = 0f32;
+    for i in 0..250 {
+        play.step(Clock::from_seconds(f64::from(i) * 0.008), &go, &mut events);
+        highest = highest.max(play.movers[0].offset().z);
+    }
+    let at = play.body.origin;
+    assert!(
+        events.contains(&Event::Moved { entity: door.entity }),
+        "{events:?} at {at}, door {door:?}"
+    );
+    assert!((highest - door.way.z).abs() < 0.1, "{highest} of {}", door.way.z);
+    assert!(play.body.origin.x < middle.x - 60.0, "through: {:?}", play.body.origin);
+    assert!(!play.states().is_empty());
+    play.body.origin = Vec3::new(middle.x + 200.0, middle.y, 25.0);
+    for i in 250..1000 {
+        play.step(
+            Clock::from_seconds(f64::from(i) * 0.008),
+            &Command::default(),
+            &mut events,
+        );
+    }
+    assert_eq!(play.movers[0].offset(), Vec3::ZERO, "it closes");
+    assert!(play.states().is_empty());
+}
+
+/// Items go when they are taken and come back.
+#[test]
+fn items_are_taken_and_come_back() {
+    let mut play = play("oa_dm1");
+    let (_, entities) = map("oa_dm1");
+    let (number, health) = (0u32..)
+        .zip(&entities)
+        .find(|(_, e)| e.class().starts_with("item_health"))
+        .unwrap();
+    play.body.origin = health.origin();
+    let mut events = Vec::new();
+    play.step(Clock::default(), &Command::default(), &mut events);
+    assert!(
+        events
+            .iter()
+            .any(|e| matches!(e, Event::Took(class) if class.starts_with("item_health"))),
+        "{events:?}"
+    );
+    let hidden = |play: &Play| play.states().iter().any(|s| s.entity == number && s.hidden);
+    assert!(hidden(&play));
+    play.body.origin += Vec3::Z * 200.0;
+    play.respawn();
+    for i in 0..(35.5 / STEP) as u32 {
+        play.step(
+            Clock::from_seconds(f64::from(i) * 0.008),
+            &Command::default(),
+            &mut events,
+        );
+    }
+    assert!(!hidden(&play));
+}
