@@ -24,6 +24,7 @@ use q3rays::scene::Scene;
 use q3rays::scene::bvh::BvhQuality;
 use q3rays::scene::camera::Camera;
 use q3rays::scene::clock::Clock;
+use q3rays::scene::entity_geometry::EntityState;
 use q3rays::scene::guests::flashlight;
 use q3rays::scene::light_power::luminance;
 use q3rays::scene::lights::point_light;
@@ -136,6 +137,65 @@ fn lights_move_with_what_carries_them() {
             let gpu = SceneGpu::new(device, &bob, backend, BvhQuality::Balanced).unwrap();
             let film = gpu_film(&gpu, &view(), SIZE, &at, 64);
             assert!(apart(&film, &truth) < 0.02, "{backend:?}: {}", apart(&film, &truth));
+        }
+    });
+}
+
+/// A lamp on a door lights from where the door is.
+#[test]
+fn lights_move_with_doors() {
+    let keys = [("origin", "180 128 128"), ("angle", "-1"), ("lip", "-36")];
+    let door = scene(&lamp("func_door", &keys));
+    let up = scene(&lamp("func_static", &[("origin", "180 128 158")]));
+    let number = door.entities.iter().position(|e| e.class() == "func_door").unwrap() as u32;
+    let at = Settings {
+        random_lights: 0,
+        ..settings()
+    };
+    let open = [EntityState {
+        entity: number,
+        offset: Vec3::Z * 30.0,
+        hidden: false,
+    }];
+    let truth = cpu(&up, &at, 64);
+    let rest = cpu(&door, &at, 64);
+    assert!(apart(&rest, &truth) > 0.1);
+    let mut opened = CpuRenderer::new(&door);
+    opened.tracer.states = open.to_vec();
+    let film = opened.accumulate(&view(), SIZE, &at, 0..64, &quiet).0;
+    assert!(apart(&film, &truth) < 0.02, "{}", apart(&film, &truth));
+    let one = Settings {
+        random_lights: 1,
+        light_sampling: LightSampling::Bvh,
+        ..at
+    };
+    let film = opened.accumulate(&view(), SIZE, &one, 0..512, &quiet).0;
+    assert!((mean(&film) / mean(&truth) - 1.0).abs() < 0.03);
+    with_device(|device| {
+        for backend in [Backend::Bvh, Backend::RayQuery] {
+            let gpu = SceneGpu::new(device, &door, backend, BvhQuality::Balanced).unwrap();
+            let renderer = GpuRenderer::new(&gpu).unwrap();
+            // It opens and closes again.
+            for (entities, wanted) in [(&[][..], &rest), (&open, &truth), (&[], &rest)] {
+                let mut seen = renderer.view(SIZE).unwrap();
+                for index in 0..64 {
+                    let input = FrameInput {
+                        camera: view(),
+                        settings: at,
+                        lights: &[],
+                        polygons: &[],
+                        entities,
+                        sample_index: index,
+                        accumulated: index + 1,
+                        exposure_blend: 1.0,
+                        reuse: false,
+                        output: false,
+                    };
+                    renderer.frame(&mut seen, &input).unwrap();
+                }
+                let film = q3rays::render::gpu_renderer::film(&seen, 64).unwrap();
+                assert!(apart(&film, wanted) < 0.02, "{backend:?}: {}", apart(&film, wanted));
+            }
         }
     });
 }

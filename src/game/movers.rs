@@ -3,7 +3,7 @@
 use super::triggers::model_of;
 use crate::assets::bsp::Bounds;
 use crate::assets::entities::Entity;
-use crate::scene::motion::door_way;
+use crate::scene::motion::Motion;
 use glam::{Affine3A, Vec3};
 
 /// How far around a door somebody is noticed, units.
@@ -63,42 +63,15 @@ impl Mover {
     pub fn new(number: u32, entity: &Entity, bounds: Bounds) -> Option<Self> {
         let positive = |key: &str, default: f32| entity.number(key).filter(|n| *n != 0.0).unwrap_or(default);
         let size = bounds.max - bounds.min;
-        let origin = entity.origin();
         let flags = entity.spawnflags();
-        let along = |lip: f32| {
-            let way = door_way(entity);
-            way * (way.abs().dot(size) - positive("lip", lip))
+        let Motion::Mover { rest, way } = Motion::of_brush_model(entity, &[], bounds.min, bounds.max) else {
+            return None;
         };
         let name = entity.get("targetname").map(str::to_owned);
-        let (kind, rest, way, speed, wait) = match entity.class() {
-            "func_door" => {
-                let way = along(8.0);
-                let (rest, way) = if flags & 1 != 0 {
-                    (origin + way, -way)
-                } else {
-                    (origin, way)
-                };
-                (Kind::Door, rest, way, positive("speed", 400.0), positive("wait", 2.0))
-            }
-            "func_plat" => {
-                let height = positive("height", size.z - positive("lip", 8.0));
-                let way = Vec3::Z * height;
-                (
-                    Kind::Platform,
-                    origin - way,
-                    way,
-                    positive("speed", 200.0),
-                    positive("wait", 1.0),
-                )
-            }
-            "func_button" => (
-                Kind::Button,
-                origin,
-                along(4.0),
-                positive("speed", 40.0),
-                positive("wait", 1.0),
-            ),
-            _ => return None,
+        let (kind, speed, wait) = match entity.class() {
+            "func_door" => (Kind::Door, positive("speed", 400.0), positive("wait", 2.0)),
+            "func_plat" => (Kind::Platform, positive("speed", 200.0), positive("wait", 1.0)),
+            _ => (Kind::Button, positive("speed", 40.0), positive("wait", 1.0)),
         };
         let here = Bounds {
             min: bounds.min + rest,

@@ -140,7 +140,7 @@ pub fn standings(placements: &[Placement], meshes: usize) -> Vec<Option<Standing
             let sweep = || p.motion.sweep().into_iter().map(|at| at * back).collect();
             Standing {
                 pose,
-                mover: p.motion.moves().then(|| (number, sweep())),
+                mover: p.motion.may_move().then(|| (number, sweep())),
             }
         });
     }

@@ -45,6 +45,8 @@ pub enum Motion {
     },
     /// Goes round its corners, with a wait at each.
     Train { legs: Vec<Leg>, seconds: f32 },
+    /// A door, platform or button: rests, and goes by `way` and back when somebody comes: [`crate::game::movers`].
+    Mover { rest: Vec3, way: Vec3 },
     /// A part of the player who stands under the eye: each joint in the frame of the one before.
     Body(Vec<Steps>),
     /// Something held before the eye, likewise.
@@ -137,6 +139,7 @@ impl Motion {
     pub fn of_brush_model(entity: &Entity, entities: &[Entity], mins: Vec3, maxs: Vec3) -> Self {
         let origin = entity.origin();
         let number = |key: &str, default: f32| entity.number(key).unwrap_or(default);
+        let positive = |key: &str, default: f32| entity.number(key).filter(|n| *n != 0.0).unwrap_or(default);
         let (flags, phase) = (entity.spawnflags(), number("phase", 0.0));
         match entity.class() {
             "func_rotating" => {
@@ -185,14 +188,26 @@ impl Motion {
             "func_train" => Self::train(entity, entities, mins),
             "func_plat" => {
                 // It waits at the bottom.
-                let lip = number("lip", 8.0);
-                let height = number("height", maxs.z - mins.z - lip);
-                Self::Still(Affine3A::from_translation(origin - Vec3::Z * height))
+                let height = positive("height", maxs.z - mins.z - positive("lip", 8.0));
+                let way = Vec3::Z * height;
+                Self::Mover {
+                    rest: origin - way,
+                    way,
+                }
             }
-            "func_door" if flags & 1 != 0 => {
-                let way = door_way(entity);
-                let distance = way.abs().dot(maxs - mins) - number("lip", 8.0);
-                Self::Still(Affine3A::from_translation(origin + way * distance))
+            class @ ("func_door" | "func_button") => {
+                let lip = positive("lip", if class == "func_door" { 8.0 } else { 4.0 });
+                let along = door_way(entity);
+                let way = along * (along.abs().dot(maxs - mins) - lip);
+                // Some doors stand open.
+                if class == "func_door" && flags & 1 != 0 {
+                    Self::Mover {
+                        rest: origin + way,
+                        way: -way,
+                    }
+                } else {
+                    Self::Mover { rest: origin, way }
+                }
             }
             _ => Self::Still(Affine3A::from_translation(origin)),
         }
@@ -239,6 +254,7 @@ impl Motion {
         let sine = |periods: u32, phase: f32| ((clock.fraction(periods) + phase) * TAU).sin();
         match self {
             Self::Still(pose) => *pose,
+            Self::Mover { rest, .. } => Affine3A::from_translation(*rest),
             Self::Item {
                 place,
                 shift,
@@ -305,6 +321,10 @@ impl Motion {
         };
         match self {
             Self::Still(pose) => vec![*pose],
+            Self::Mover { rest, way } => vec![
+                Affine3A::from_translation(*rest),
+                Affine3A::from_translation(*rest + *way),
+            ],
             Self::Train { legs, .. } => legs.iter().map(|l| Affine3A::from_translation(l.from)).collect(),
             Self::Rotating { origin, axis, .. } => turned(&|angle| Quat::from_axis_angle(*axis, angle), *origin),
             Self::Pendulum {
@@ -331,14 +351,19 @@ impl Motion {
         }
     }
 
-    /// Whether the pose changes.
+    /// Whether the pose changes with time.
     pub fn moves(&self) -> bool {
+        !matches!(self, Self::Still(_) | Self::Mover { .. })
+    }
+
+    /// Whether it may ever stand elsewhere.
+    pub fn may_move(&self) -> bool {
         !matches!(self, Self::Still(_))
     }
 }
 
 /// Unit direction that a door opens to: `angle` −1 is up, −2 down.
-pub fn door_way(entity: &Entity) -> Vec3 {
+fn door_way(entity: &Entity) -> Vec3 {
     match entity.number("angle").unwrap_or(0.0) {
         -1.0 => Vec3::Z,
         -2.0 => Vec3::NEG_Z,
