@@ -10,6 +10,21 @@
 layout(local_size_x = 128) in;
 
 shared float sums[128];
+shared float lit[EXPOSURE_CELLS * EXPOSURE_CELLS];
+
+// The sum over all lanes, the same for each.
+float total(float own) {
+    uint lane = gl_LocalInvocationIndex;
+    sums[lane] = own;
+    barrier();
+    for (uint half_ = 64; half_ > 0; half_ >>= 1) {
+        if (lane < half_) sums[lane] += sums[lane + half_];
+        barrier();
+    }
+    float sum = sums[0];
+    barrier();
+    return sum;
+}
 
 void main() {
     uint lane = gl_LocalInvocationIndex;
@@ -29,16 +44,21 @@ void main() {
             float l = luminance(c);
             mean += isnan(l) || isinf(l) ? 0.0 : l;
         }
-        sum += log(max(mean / float(points.x * points.y), LUMINANCE_FLOOR));
+        lit[i] = mean / float(points.x * points.y);
+        sum += lit[i];
     }
-    sums[lane] = sum;
-    barrier();
-    for (uint half_ = 64; half_ > 0; half_ >>= 1) {
-        if (lane < half_) sums[lane] += sums[lane + half_];
-        barrier();
+    float dark = total(sum) / float(n) * DARK_SHARE;
+    float logs = 0.0, weights = 0.0;
+    [[dont_unroll]] for (uint i = lane; i < n; i += 128) {
+        float weight = dark > 0.0 ? min(lit[i] / dark, 1.0) : 1.0;
+        logs += weight * log(max(lit[i], LUMINANCE_FLOOR));
+        weights += weight;
     }
+    logs = total(logs);
+    weights = total(weights);
     if (lane == 0) {
-        float wanted = clamp(sqrt(GAME_EXPOSURE * KEY / exp(sums[0] / float(n))), EXPOSURE_RANGE.x, EXPOSURE_RANGE.y);
+        float average = exp(logs / max(weights, 1.17549435e-38));
+        float wanted = clamp(sqrt(GAME_EXPOSURE * KEY / average), EXPOSURE_RANGE.x, EXPOSURE_RANGE.y);
         float before = FC.exposure.at[0];
         FC.exposure.at[0] = before > 0.0 ? before * pow(wanted / before, FC.exposure_blend) : wanted;
     }

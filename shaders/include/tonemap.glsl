@@ -8,6 +8,7 @@ const float GAME_EXPOSURE = 255.0 / 64.0;
 const float KEY = 0.12;
 const float LUMINANCE_FLOOR = 1e-4;
 const uint EXPOSURE_CELLS = 32;
+const float DARK_SHARE = 1.0 / 16.0;
 const vec2 EXPOSURE_RANGE = vec2(0.05, 16.0);
 
 vec3 tone_map(vec3 x, uint curve) {

@@ -223,6 +223,14 @@ pub fn deformed(deforms: &[Deform], rest: &RestVertex, uv: Vec2, quad: [Vec3; 4]
     out
 }
 
+/// Right and up of a quad as modelled, seen from its front.
+pub fn sprite_axes(quad: [Vec3; 4]) -> [Vec3; 2] {
+    let own = (quad[1] - quad[0]).cross(quad[2] - quad[0]).normalize_or(Vec3::X);
+    let up = if own.z.abs() < 0.999 { Vec3::Z } else { Vec3::X };
+    let right = up.cross(own).normalize_or(Vec3::Y);
+    [right, own.cross(right)]
+}
+
 /// A corner of a quad that faces the eye, upright.
 fn sprite(v: &Moved, quad: [Vec3; 4], eye: Vec3) -> Moved {
     let middle = (quad[0] + quad[1] + quad[2] + quad[3]) * 0.25;
@@ -231,10 +239,7 @@ fn sprite(v: &Moved, quad: [Vec3; 4], eye: Vec3) -> Moved {
     let right = up.cross(normal).normalize();
     let up = normal.cross(right);
     // Where the corner stands in the plane of the quad as modelled: its own axes.
-    let own = (quad[1] - quad[0]).cross(quad[2] - quad[0]).normalize_or(Vec3::X);
-    let own_up = if own.z.abs() < 0.999 { Vec3::Z } else { Vec3::X };
-    let own_right = own_up.cross(own).normalize_or(Vec3::Y);
-    let own_up = own.cross(own_right);
+    let [own_right, own_up] = sprite_axes(quad);
     let d = v.position - middle;
     Moved {
         position: middle + right * d.dot(own_right) + up * d.dot(own_up),

@@ -1,6 +1,6 @@
 //! Static world and brush models: the map's drawn surfaces as triangles.
 
-use super::dynamic_geometry::{Dynamic, DynamicPart, reach, swept};
+use super::dynamic_geometry::{Dynamic, DynamicPart, reach, sprite_axes, swept};
 use super::material::{MaterialSource, Visibility};
 use super::models::Models;
 use super::polygons::Room;
@@ -267,8 +267,13 @@ impl Geometry {
         self.append(mesh);
         let sprites = deforms.iter().any(|d| d.kind >= DEFORM_AUTOSPRITE);
         let quads = sprites && mesh.vertices.len().is_multiple_of(4);
+        if quads && deforms.iter().any(|d| d.kind == DEFORM_AUTOSPRITE) {
+            for q in (base..self.positions.len() as u32).step_by(4) {
+                self.stamp(q as usize);
+            }
+        }
         let rest = mesh.vertices.iter().enumerate().map(|(i, v)| RestVertex {
-            position: v.position.into(),
+            position: self.positions[base as usize + i],
             normal: v.normal.into(),
             quad: if quads { base + i as u32 / 4 * 4 } else { NONE },
             // What is made of anything but quads can't turn.
@@ -284,6 +289,29 @@ impl Geometry {
                 std::array::from_fn(|k| at(q + k as u32))
             });
             boxes.push(swept(vertices.map(at), quad, reach(deforms)));
+        }
+    }
+
+    /// Makes a sprite of the quad of four vertices: a square with the whole texture on it, whatever the map's coordinates say.
+    fn stamp(&mut self, first: usize) {
+        let corners: [Vec3; 4] = std::array::from_fn(|k| self.positions[first + k].into());
+        let middle = corners.iter().sum::<Vec3>() * 0.25;
+        let [right, up] = sprite_axes(corners);
+        let half = corners[0].distance(middle) * std::f32::consts::FRAC_1_SQRT_2;
+        let mut around: Vec<(f32, usize)> = (0..4)
+            .map(|k| {
+                let d = corners[k] - middle;
+                (d.dot(up).atan2(d.dot(right)), k)
+            })
+            .collect();
+        around.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Counter-clockwise from below on the left, seen from the front; the texture's v goes down.
+        for ((_, k), [x, y]) in around
+            .into_iter()
+            .zip([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        {
+            self.positions[first + k] = (middle + (right * x + up * y) * half).into();
+            self.attributes[first + k].uv = [0.5 + 0.5 * x, 0.5 - 0.5 * y];
         }
     }
 
