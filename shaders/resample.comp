@@ -64,7 +64,8 @@ void resample(SurfaceHit at, float distance, uint address, inout Reservoir kept,
     Reservoir old = history_at(at, distance);
     float old_count = min(old.count, float(FC.reuse_history * n));
     bool from_old = false;
-    if (old_count > 0.0 && old.weight > 0.0) {
+    // The frame before did not know this frame's guests: what it has of its own is another light or the same elsewhere.
+    if (old_count > 0.0 && old.weight > 0.0 && old.light < GUEST_LIGHT) {
         LightPoint candidate = LightPoint(old.light, old.point);
         float t = luminance(sample_point(candidate, at).value);
         float weight = t * old.weight * old_count;
@@ -83,7 +84,7 @@ void resample(SurfaceHit at, float distance, uint address, inout Reservoir kept,
     SurfaceHit before = receiver_of(old);
     float old_target = 0.0;
     LightSample seen;
-    if (old_count > 0.0) {
+    if (old_count > 0.0 && point.light < GUEST_LIGHT) {
         seen = sample_point(point, before);
         old_target = luminance(seen.value);
     }

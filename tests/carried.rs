@@ -30,7 +30,7 @@ use q3rays::scene::light_power::luminance;
 use q3rays::scene::lights::point_light;
 use q3rays::scene::material::Visibility;
 use q3rays::scene::polygons::{Corner, Polygon};
-use q3rays::scene::records::LIGHT_SUN;
+use q3rays::scene::records::{LIGHT_SUN, Light};
 
 const SIZE: (u32, u32) = (32, 18);
 const ALL_WAYS: [LightSampling; 5] = [
@@ -365,6 +365,48 @@ fn flashlights_shine_where_one_looks() {
             assert!((ratio - 1.0).abs() < 0.01, "{random_lights}: {ratio}");
         }
         assert_eq!(mean(&gpu_film(&gpu, &view(), SIZE, &settings(), 4)), 0.0);
+        // A light of the frame's own comes into a running view at its full brightness at once, and goes again: with reservoirs that
+        // remember it, too.
+        let renderer = GpuRenderer::new(&gpu).unwrap();
+        let mut seen = renderer.view(SIZE).unwrap();
+        let flash = [point_light(Vec3::new(120.0, 128.0, 128.0), 300.0, Vec3::ONE)];
+        let mut visited = CpuRenderer::new(&dark);
+        visited.tracer.guests = flash.to_vec();
+        let wanted = visited
+            .accumulate(&view(), SIZE, &Settings { flashlight: 0.0, ..on }, 0..64, &quiet)
+            .0;
+        let shown =
+            |seen: &mut q3rays::render::view_state::ViewState, index: u32, lights: &[Light], settings: Settings| {
+                let input = FrameInput {
+                    camera: view(),
+                    settings,
+                    lights,
+                    polygons: &[],
+                    entities: &[],
+                    sample_index: index,
+                    accumulated: 0,
+                    exposure_blend: 1.0,
+                    reuse: true,
+                    output: false,
+                };
+                renderer.frame(seen, &input).unwrap();
+                let bytes = seen.gbuffer.direct().read_back(0).unwrap();
+                let texels: Vec<[f32; 4]> = bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect();
+                texels.iter().map(|t| luminance([t[0], t[1], t[2]])).sum::<f32>() / texels.len() as f32
+            };
+        let reusing = Settings {
+            denoiser: false,
+            taa: false,
+            ..settings()
+        };
+        for index in 0..24 {
+            assert_eq!(shown(&mut seen, index, &[], reusing), 0.0);
+        }
+        let first = shown(&mut seen, 24, &flash, reusing);
+        let later: f32 = (25..33).map(|i| shown(&mut seen, i, &flash, reusing)).sum::<f32>() / 8.0;
+        assert!((first / later - 1.0).abs() < 0.1, "{first} at once, {later} later");
+        assert!(mean(&wanted) > 0.0 && later > 0.0);
+        assert_eq!(shown(&mut seen, 33, &[], reusing), 0.0);
     });
 }
 
@@ -449,8 +491,20 @@ fn polygons_look_like_surfaces_of_the_map() {
     ];
     let lit = |map: &mut q3rays::assets::bsp::build::MapBuilder| {
         map.entity(Entity::light(Vec3::new(60.0, 128.0, 200.0), 300.0, [1.0; 3]));
+        // Something that deforms, whose vertices must not be taken for the polygons'.
+        let flag = Paint {
+            shader: map.shader("textures/fixture/flag", 0, 0),
+            mapping: Mapping::Fit,
+        };
+        let at = |y: f32, z: f32| Vec3::new(230.0, y, z);
+        map.quad(
+            [at(200.0, 20.0), at(200.0, 60.0), at(240.0, 60.0), at(240.0, 20.0)],
+            flag,
+        );
     };
-    let grey = script.replace("rgbGen vertex", "rgbGen const ( 0.5 0.5 0.5 )");
+    let grey = script.replace("rgbGen vertex", "rgbGen const ( 0.5 0.5 0.5 )")
+        + "textures/fixture/flag\n{\n\tcull none\n\tdeformVertexes move 0 0 9 sin 0 1 0 1\n\t{\n\t\tmap textures/fixture/grey128\n\t}\n\t{\n\t\tmap \
+           $lightmap\n\t\tblendFunc filter\n\t}\n}\n";
     let built = scene(&boxed("built", &grey, |map, _| {
         let paint = Paint {
             shader: map.shader("textures/fixture/mark", surface_flags::NOLIGHTMAP, 0),

@@ -88,7 +88,7 @@ fn nobody_leaves_the_world() {
         let mut play = play(name);
         let mut events = Vec::new();
         let mut command = Command::default();
-        let (mut farthest, start, mut deaths) = (0f32, play.body.origin, 0);
+        let (mut farthest, start, mut deaths, mut falls) = (0f32, play.body.origin, 0, 0);
         for i in 0..STEPS {
             if i % 40 == 0 {
                 let r = |d: u32| random(number, i, d);
@@ -112,6 +112,7 @@ fn nobody_leaves_the_world() {
                 &mut events,
             );
             deaths += events.iter().filter(|e| **e == Event::Died).count();
+            falls += events.iter().filter(|e| **e == Event::Fell).count();
             let at = play.body.origin;
             assert!(at.is_finite() && play.body.velocity.is_finite(), "{name} step {i}");
             if i % 16 == 0 {
@@ -123,6 +124,7 @@ fn nobody_leaves_the_world() {
         println!("{name}: {farthest:.0} units from the spawn at most, {deaths} deaths");
         assert!(farthest > 300.0, "{name}: {farthest}");
         assert!(deaths < 400, "{name}: {deaths} deaths");
+        assert_eq!(falls, 0, "{name}: out of the map");
     }
 }
 

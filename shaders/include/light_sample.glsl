@@ -13,9 +13,10 @@ const uint GUEST_LIGHT = 0x80000000u;
 Light light_at(uint number) {
     if (number >= GUEST_LIGHT) {
         uint guest = number - GUEST_LIGHT;
-        Light light = FC.guest_lights.at[min(guest, max(FC.guest_count, 1) - 1)];
-        if (guest >= FC.guest_count) light.radiance = vec3(0.0);
-        return light;
+        if (guest >= FC.guest_count) {
+            return Light(LIGHT_SPHERE, 0, NONE, NONE, vec3(0.0), 0.0, vec3(0.0), NONE, vec3(0.0), 0, vec3(0.0), 1.0);
+        }
+        return FC.guest_lights.at[guest];
     }
     Light light = FC.lights.at[number];
     if (light.instance != NONE) {

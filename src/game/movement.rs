@@ -115,6 +115,8 @@ pub struct Body {
     pub view_lag: f32,
     /// A jump pad has thrown it: no friction until it lands.
     pub thrown: bool,
+    /// It leaps out of water.
+    pub leaping: bool,
 }
 
 /// What somebody stands on or slides down.
@@ -192,7 +194,9 @@ impl Body {
         self.crouch(world, command.up < -0.1);
         self.find_liquid(world);
         self.find_ground(world);
-        if self.depth > Depth::Feet {
+        if self.leaping {
+            self.leap(world);
+        } else if self.depth > Depth::Feet {
             self.swim(world, command, [forward, right]);
         } else {
             let walking = self.ground.is_some_and(|g| g.walkable) && !self.jumps(command);
@@ -203,7 +207,9 @@ impl Body {
                 None => level(v),
             };
             let wish = along(forward) * command.forward + along(right) * command.right;
-            let speed = self.speed_of(command);
+            // Who holds the key of a jump that is done runs no slower for it.
+            let up = if walking && command.up > 0.0 { 0.0 } else { command.up };
+            let speed = self.speed_of(&Command { up, ..*command });
             if walking {
                 self.run(world, wish, speed);
             } else {
@@ -377,6 +383,7 @@ impl Body {
 
     fn swim(&mut self, world: &World<'_>, command: &Command, [forward, right]: [Vec3; 2]) {
         if self.leaps_out(world, forward) {
+            self.leap(world);
             return;
         }
         self.friction();
@@ -399,15 +406,7 @@ impl Body {
 
     /// At the rim of a pool: out of the water onto what is ahead.
     fn leaps_out(&mut self, world: &World<'_>, forward: Vec3) -> bool {
-        if self.held > 0.0 {
-            self.velocity.z -= GRAVITY * STEP;
-            self.slide(world, true);
-            if self.velocity.z < 0.0 {
-                self.held = 0.0;
-            }
-            return true;
-        }
-        if self.depth != Depth::Waist {
+        if self.depth != Depth::Waist || self.held > 0.0 {
             return false;
         }
         let level = forward.with_z(0.0).normalize_or_zero();
@@ -420,7 +419,20 @@ impl Body {
         }
         self.velocity = forward * 200.0 + Vec3::Z * (350.0 - forward.z * 200.0);
         self.held = 2.0;
+        self.leaping = true;
         true
+    }
+
+    /// On the way out of the water: what is in the way does not take the speed, until one falls.
+    fn leap(&mut self, world: &World<'_>) {
+        let before = self.velocity;
+        self.ground = None;
+        self.step_slide(world, true);
+        self.velocity = before - Vec3::Z * (2.0 * GRAVITY * STEP);
+        if self.velocity.z < 0.0 || self.held == 0.0 {
+            self.leaping = false;
+            self.held = 0.0;
+        }
     }
 }
 

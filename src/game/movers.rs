@@ -30,6 +30,10 @@ enum State {
     Returning,
 }
 
+/// A moment of a mover's way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WayNow(State, f32);
+
 /// A brush model between two places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mover {
@@ -79,7 +83,9 @@ impl Mover {
         };
         let field = match kind {
             // Named ones wait for what names them.
-            Kind::Door | Kind::Button if name.is_some() => None,
+            _ if name.is_some() => None,
+            // These want to be shot at.
+            Kind::Door | Kind::Button if positive("health", 0.0) != 0.0 => None,
             Kind::Button => Some(here.grown(1.0)),
             Kind::Door => {
                 // Out of the thinnest sides.
@@ -156,9 +162,15 @@ impl Mover {
         }
     }
 
-    /// Goes the other way: something is between.
-    pub fn turn_back(&mut self) {
-        self.state = match self.state {
+    /// Where on its way it is, for [`Self::turn_back`].
+    pub fn way_now(&self) -> WayNow {
+        WayNow(self.state, self.share)
+    }
+
+    /// Goes the other way from where it was: something is between.
+    pub fn turn_back(&mut self, was: WayNow) {
+        self.share = was.1;
+        self.state = match was.0 {
             State::Going => State::Returning,
             State::Returning => State::Going,
             other => other,

@@ -21,8 +21,8 @@ const SLIME: f32 = 14.0;
 /// Speed out of a teleporter, and seconds until the keys count again.
 const TELEPORT_SPEED: f32 = 400.0;
 const TELEPORT_HOLD: f32 = 0.16;
-/// An item is taken within this of its place, x and y; z is shorter.
-const ITEM_REACH: Vec3 = Vec3::new(51.0, 51.0, 51.0);
+/// An item is taken by who stands within this of its place.
+const ITEM_REACH: [Vec3; 2] = [Vec3::new(-50.0, -36.0, -36.0), Vec3::new(44.0, 36.0, 36.0)];
 /// Below the map by this much one has fallen out of it.
 const OUT: f32 = 1024.0;
 /// Most time that is made up for after a stop, seconds.
@@ -37,6 +37,8 @@ pub enum Event {
     Teleported,
     /// Health came to nothing: back at a spawn.
     Died,
+    /// Out of the map: likewise.
+    Fell,
     Took(&'static str),
     Moved {
         entity: u32,
@@ -192,6 +194,7 @@ impl Play {
     /// Moves what moves, and who stands on it or in its way.
     fn move_models(&mut self, clock: Clock, events: &mut Vec<Event>) {
         let before = self.placed.clone();
+        let ways: Vec<_> = self.movers.iter().map(Mover::way_now).collect();
         if !self.frozen {
             self.movers.iter_mut().for_each(|m| m.advance(STEP));
         }
@@ -206,7 +209,7 @@ impl Play {
             }
             let size = extent(self.body.crouched);
             let rides = self.body.ground.is_some_and(|g| g.model == new.model);
-            let shoved = self.collision.touches(size, self.body.origin, &new);
+            let shoved = self.collision.touches(size, self.body.origin, PLAYER_SOLID, &new);
             if !rides && !shoved {
                 continue;
             }
@@ -218,14 +221,16 @@ impl Play {
             if fits(there) {
                 self.body.origin = there;
             } else if shoved && !fits(self.body.origin) {
-                match self.movers.get_mut(i).filter(|m| !m.crusher) {
-                    Some(mover) => {
-                        mover.turn_back();
-                        // Back to where it was: nobody is inside of it.
-                        mover.advance(STEP);
-                        self.placed[i].pose = mover.pose();
+                if self.movers.get(i).is_none_or(|m| m.crusher) {
+                    self.die(events);
+                    continue;
+                }
+                // All that move together go back to where they were, where nobody was inside of them.
+                for (k, was) in ways.iter().enumerate() {
+                    if k == i || self.movers[k].is_team(&self.movers[i]) {
+                        self.movers[k].turn_back(*was);
+                        self.placed[k].pose = self.movers[k].pose();
                     }
-                    None => self.die(events),
                 }
             }
         }
@@ -241,7 +246,7 @@ impl Play {
         let touched: Vec<_> = self
             .triggers
             .iter()
-            .filter(|t| self.collision.touches(size, self.body.origin, &t.placed))
+            .filter(|t| self.collision.touches(size, self.body.origin, -1, &t.placed))
             .map(|t| t.effect.clone())
             .collect();
         for effect in touched {
@@ -308,8 +313,9 @@ impl Play {
 
     fn take_items(&mut self, events: &mut Vec<Event>) {
         for item in &mut self.items {
-            let off = (Vec3::from(item.placed.place.translation) - self.body.origin).abs();
-            if item.gone == 0.0 && off.cmple(ITEM_REACH).all() {
+            let off = self.body.origin - Vec3::from(item.placed.place.translation);
+            let [low, high] = ITEM_REACH;
+            if item.gone == 0.0 && off.cmpge(low).all() && off.cmple(high).all() {
                 item.gone = seconds_gone(item.placed.item.kind);
                 if item.gone > 0.0 {
                     events.push(Event::Took(item.placed.item.class));
@@ -330,7 +336,11 @@ impl Play {
         } else if self.body.liquid & content_flags::SLIME != 0 {
             self.health -= SLIME * depth * STEP;
         }
-        if self.health <= 0.0 || self.body.origin.z < self.bounds.min.z - OUT {
+        let fell = self.body.origin.z < self.bounds.min.z - OUT;
+        if fell {
+            events.push(Event::Fell);
+        }
+        if self.health <= 0.0 || fell {
             self.die(events);
         }
     }

@@ -208,7 +208,7 @@ pub fn emission_met(
     let mut seen = emission_seen(scene, s, direction, settings.shown_emission);
     let sky = scene.materials[s.material as usize].flags & MATERIAL_SKY != 0;
     // Light samples of a lobe have found the suns.
-    if settings.draw_sun && lobe.is_none() && sky {
+    if settings.draw_sun && lobe.is_none_or(|l| l.pdf <= 0.0) && sky {
         seen += suns_seen(&scene.lights, direction, settings.shown_emission);
     }
     let Some((start, number)) = lobe.zip(tracer.light_of(hit.triangle)) else {

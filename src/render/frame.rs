@@ -39,7 +39,8 @@ const LEAST_BRANCH_SHARE: f32 = 0.25;
 pub struct FrameInput<'a> {
     pub camera: Camera,
     pub settings: Settings,
-    /// Lights that are in this frame beside the map's: [`crate::scene::guests`]. World space; any number.
+    /// Lights that are in this frame beside the map's: [`crate::scene::guests`]. World space; any number of spheres, others are
+    /// left out.
     pub lights: &'a [Light],
     /// Polygons that are in this frame: [`crate::scene::polygons`].
     pub polygons: &'a [Polygon],
@@ -148,9 +149,11 @@ impl FrameRenderer {
             if view.entities.0 != input.entities {
                 view.entities = (input.entities.to_vec(), view.entities.1.wrapping_add(1));
             }
+            view.polygons.note(input.polygons);
             let revision = scene
                 .revision()
                 .wrapping_add(view.guests.revision)
+                .wrapping_add(view.polygons.revision)
                 .wrapping_add(view.entities.1);
             view.history.advance(constants, input, revision, scene.moving)
         };

@@ -13,6 +13,9 @@ use ash::vk;
 #[derive(Default)]
 pub struct Polygons {
     staging: Vec<Option<Buffer>>,
+    before: Vec<Polygon>,
+    /// Number of changes so far.
+    pub revision: u32,
 }
 
 /// A range of bytes on its way to a buffer of the scene.
@@ -31,6 +34,14 @@ fn part<'a, T: bytemuck::NoUninit>(target: &'a Buffer, first: u32, data: &[T]) -
 }
 
 impl Polygons {
+    /// Counts a change where a frame's polygons are not those of the frame before.
+    pub fn note(&mut self, polygons: &[Polygon]) {
+        if self.before != polygons {
+            self.before = polygons.to_vec();
+            self.revision = self.revision.wrapping_add(1);
+        }
+    }
+
     /// Records what brings the scene's buffers up to date, where they are not; returns the mesh of the polygons, `None` where the
     /// scene has no room for any.
     ///
@@ -82,6 +93,12 @@ impl Polygons {
             part(&b.bvh2_triangles, at.bvh2_triangle, &tree.bvh2_triangles),
         ];
         let staging = self.staged(scene, slot, &parts)?;
+        // Frames before this one may still read what is written now.
+        let read: Vec<_> = parts
+            .iter()
+            .map(|p| Use::buffer(p.target, Access::ComputeRead))
+            .collect();
+        tracker.pass(cmd, &read)?;
         let uses: Vec<_> = (parts.iter())
             .map(|p| Use::buffer(p.target, Access::TransferWrite))
             .chain([Use::buffer(staging, Access::TransferRead)])
@@ -95,6 +112,7 @@ impl Polygons {
         if let Some((driver, refit)) = scene.driver.as_ref().and_then(|d| Some((d, d.polygons.as_ref()?)))
             && let Some(level) = driver.bottom(room.mesh)
         {
+            tracker.pass(cmd, &[Use::resource(level.id(), Access::Trace)])?;
             let uses = [
                 Use::buffer(&scene.positions, Access::BuildInput),
                 Use::resource(level.id(), Access::BuildWrite),

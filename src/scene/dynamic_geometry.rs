@@ -139,9 +139,14 @@ impl Dynamic {
                 .filter(|p| p.mesh == part.carrier && p.steps == 1)
                 .map(|p| Placement {
                     mesh: part.mesh,
+                    // Beside a carrier with less detail it keeps its own.
+                    less_detailed: Vec::new(),
                     ..p.clone()
                 })
                 .collect();
+            if carried.is_empty() {
+                continue;
+            }
             placements.extend(carried);
             for v in part.vertices.clone() {
                 self.rest[(v - self.vertices.start) as usize].instance = first;

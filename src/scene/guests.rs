@@ -2,7 +2,7 @@
 
 use super::camera::{Camera, EYE_HEIGHT};
 use super::lights::point_light;
-use super::records::{LIGHT_SPOT, Light};
+use super::records::{LIGHT_SPHERE, LIGHT_SPOT, Light};
 use glam::Vec3;
 
 /// Lights of numbers from here on are the frame's own.
@@ -26,9 +26,9 @@ pub fn flashlight(camera: &Camera, brightness: f32) -> Light {
     light
 }
 
-/// All guests of a frame: its own, and the flashlight where it is on.
+/// All guests of a frame: its own that are spheres, and the flashlight where it is on.
 pub fn guests(own: &[Light], camera: &Camera, brightness: f32) -> Vec<Light> {
-    let mut out = own.to_vec();
+    let mut out: Vec<Light> = own.iter().filter(|l| l.kind == LIGHT_SPHERE).copied().collect();
     if brightness > 0.0 {
         out.push(flashlight(camera, brightness));
     }

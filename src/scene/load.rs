@@ -11,7 +11,6 @@ use super::material::{MaterialSource, Tables};
 use super::models::Models;
 use super::motion::Motion;
 use super::player::{self, Player, Shelf};
-use super::polygons::Room;
 use super::portals;
 use super::records::{BspNode, Material, Portal};
 use super::spawns::{Spawn, spawns};
@@ -212,12 +211,9 @@ impl Scene {
         let portals = portals::portals(&bsp, &entities, &material_sources);
         let fogs = Fogs::new(&bsp, &scripts);
         let emits: Vec<bool> = material_sources.iter().map(|m| m.surface_light().is_some()).collect();
-        let mut geometry = static_geometry::build(&bsp, &material_sources, &emits, &models);
+        let mut geometry = static_geometry::build(&bsp, &material_sources, &emits, &models, options.polygons);
         if geometry.meshes.is_empty() {
             warnings.push("the map has no world model: nothing is drawn".to_owned());
-        }
-        if options.polygons > 0 {
-            geometry.polygons = Some(Room::add(&mut geometry, options.polygons));
         }
         let mut placements = entity_geometry::placements(&bsp, &entities);
         let first_model = bsp.models.len() as u32;

@@ -139,7 +139,6 @@ impl Motion {
     pub fn of_brush_model(entity: &Entity, entities: &[Entity], mins: Vec3, maxs: Vec3) -> Self {
         let origin = entity.origin();
         let number = |key: &str, default: f32| entity.number(key).unwrap_or(default);
-        let positive = |key: &str, default: f32| entity.number(key).filter(|n| *n != 0.0).unwrap_or(default);
         let (flags, phase) = (entity.spawnflags(), number("phase", 0.0));
         match entity.class() {
             "func_rotating" => {
@@ -188,7 +187,7 @@ impl Motion {
             "func_train" => Self::train(entity, entities, mins),
             "func_plat" => {
                 // It waits at the bottom.
-                let height = positive("height", maxs.z - mins.z - positive("lip", 8.0));
+                let height = number("height", maxs.z - mins.z - number("lip", 8.0));
                 let way = Vec3::Z * height;
                 Self::Mover {
                     rest: origin - way,
@@ -196,7 +195,7 @@ impl Motion {
                 }
             }
             class @ ("func_door" | "func_button") => {
-                let lip = positive("lip", if class == "func_door" { 8.0 } else { 4.0 });
+                let lip = number("lip", if class == "func_door" { 8.0 } else { 4.0 });
                 let along = door_way(entity);
                 let way = along * (along.abs().dot(maxs - mins) - lip);
                 // Some doors stand open.

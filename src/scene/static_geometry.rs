@@ -137,7 +137,8 @@ fn surface_mesh(bsp: &Bsp, materials: &[MaterialSource], index: u32) -> SurfaceM
 }
 
 /// Builds all models of a map, then the MD3 models that it places.
-pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &Models) -> Geometry {
+/// `polygons`: triangles that frames may bring along.
+pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &Models, polygons: u32) -> Geometry {
     let meshes: Vec<SurfaceMesh> = (0..bsp.surfaces.len() as u32)
         .into_par_iter()
         .map(|i| surface_mesh(bsp, materials, i))
@@ -165,6 +166,8 @@ pub fn build(bsp: &Bsp, materials: &[MaterialSource], emits: &[bool], models: &M
         out.append_mesh(*class, &still, materials);
         dynamic.push(moved);
     }
+    // Before what deforms: shaders know that by its vertices' numbers, which come last but for untraced ones.
+    out.polygons = (polygons > 0).then(|| Room::add(&mut out, polygons));
     out.dynamic.vertices = out.positions.len() as u32..out.positions.len() as u32;
     for (carrier, surfaces) in (0u32..).zip(&dynamic) {
         if !surfaces.is_empty() {

@@ -79,7 +79,9 @@ impl Brush {
                 leave = f64::min(leave, ((from + GAP) / (from - to)).min(1.0));
             }
         }
-        if self.sides.is_empty() {
+        // Nonsense from a damaged map stops nobody.
+        let sane = sweep.start.is_finite() && sweep.end.is_finite();
+        if self.sides.is_empty() || !sane {
             return Meeting::Apart;
         }
         if !starts_out {

@@ -111,7 +111,13 @@ impl CollisionWorld {
                 };
                 Brush {
                     contents: flags(b.shader).0,
-                    sides: bsp.brush_sides[sides].iter().map(side).collect(),
+                    sides: bsp
+                        .brush_sides
+                        .get(sides)
+                        .unwrap_or_default()
+                        .iter()
+                        .map(side)
+                        .collect(),
                 }
             })
             .collect();
@@ -139,7 +145,7 @@ impl CollisionWorld {
         }
         let models = bsp.models.iter().map(|m| {
             let surfaces = m.first_surface.max(0) as usize..(m.first_surface.max(0) + m.surface_count.max(0)) as usize;
-            let own = &facets_of_surface[surfaces];
+            let own = facets_of_surface.get(surfaces).unwrap_or_default();
             let bounds = Bounds {
                 min: m.mins.into(),
                 max: m.maxs.into(),
@@ -152,7 +158,8 @@ impl CollisionWorld {
         });
         let leafs = bsp.leafs.iter().map(|l| {
             let range = |first: i32, count: i32| first.max(0) as usize..(first.max(0) + count.max(0)) as usize;
-            let brushes = bsp.leaf_brushes[range(l.first_leaf_brush, l.leaf_brush_count)].iter();
+            let own = bsp.leaf_brushes.get(range(l.first_leaf_brush, l.leaf_brush_count));
+            let brushes = own.unwrap_or_default().iter();
             (brushes.map(|b| *b as u32).collect(), Vec::new())
         });
         let models: Vec<Model> = models.collect();
@@ -212,7 +219,8 @@ impl CollisionWorld {
             found.facet(&self.facets[f as usize], &sweep, mask, 0);
         }
         for p in placed {
-            let Some(model) = self.models.get(p.model).filter(|m| m.bounds.is_some()) else {
+            let model = self.models.get(p.model).filter(|m| m.bounds.is_some());
+            let Some(model) = model.filter(|_| p.pose.is_finite()) else {
                 continue;
             };
             let back = p.pose.inverse();
@@ -223,7 +231,7 @@ impl CollisionWorld {
                 half,
             };
             let mut of_model = Found::default();
-            for b in &self.brushes[model.brushes.clone()] {
+            for b in self.brushes_of(model) {
                 of_model.brush(b, &own, mask, p.model);
             }
             for f in &self.facets[model.facets.clone()] {
@@ -251,12 +259,16 @@ impl CollisionWorld {
                 return all;
             };
             let at = p.pose.inverse().transform_point3(point).as_dvec3();
-            all | of(&mut self.brushes[model.brushes.clone()].iter(), at)
+            all | of(&mut self.brushes_of(model).iter(), at)
         })
     }
 
-    /// Whether a box at `origin` touches a brush of a model.
-    pub fn touches(&self, extent: Extent, origin: Vec3, placed: &Placed) -> bool {
+    fn brushes_of(&self, model: &Model) -> &[Brush] {
+        self.brushes.get(model.brushes.clone()).unwrap_or_default()
+    }
+
+    /// Whether a box at `origin` touches a brush of a model whose contents are of `mask`.
+    pub fn touches(&self, extent: Extent, origin: Vec3, mask: i32, placed: &Placed) -> bool {
         let Some(model) = self.models.get(placed.model) else {
             return false;
         };
@@ -266,9 +278,10 @@ impl CollisionWorld {
             .as_dvec3();
         let half = ((extent.maxs - extent.mins) * 0.5).as_dvec3();
         let meets = |b: &Brush| {
-            !b.sides.is_empty() && (b.sides.iter()).all(|s| s.normal.dot(middle) <= s.dist + s.normal.abs().dot(half))
+            let reaches = |s: &Side| s.normal.dot(middle) <= s.dist + s.normal.abs().dot(half);
+            b.contents & mask != 0 && !b.sides.is_empty() && b.sides.iter().all(reaches)
         };
-        self.brushes[model.brushes.clone()].iter().any(meets)
+        self.brushes_of(model).iter().any(meets)
     }
 
     /// Bounds of a brush model, in its own space.
@@ -288,7 +301,7 @@ impl CollisionWorld {
         let Some(world) = self.models.first() else {
             return found.trace(start, end);
         };
-        for b in &self.brushes[world.brushes.clone()] {
+        for b in self.brushes_of(world) {
             found.brush(b, &sweep, mask, 0);
         }
         for f in &self.facets[world.facets.clone()] {
