@@ -4,6 +4,7 @@ mod slide;
 
 use super::collision::{CollisionWorld, Extent, PLAYER_SOLID, Placed, Trace};
 use crate::assets::bsp::lumps::{content_flags, surface_flags};
+use crate::scene::camera::EYE_HEIGHT;
 use glam::{Quat, Vec3};
 
 /// Length of a step, seconds.
@@ -39,7 +40,7 @@ const BELOW: f32 = 24.0;
 const STANDING: f32 = 32.0;
 const CROUCHED: f32 = 16.0;
 /// Heights of the eye over the origin.
-pub const EYE: f32 = 26.0;
+pub const EYE: f32 = EYE_HEIGHT;
 pub const CROUCHED_EYE: f32 = 12.0;
 /// Share of a step in the view's height that is left after a second, about: it goes smoothly.
 const STEP_VIEW_RATE: f32 = 12.0;

@@ -1,6 +1,6 @@
 //! Somebody in a map: the body, what it touches, and what moves because of it. In fixed steps of time.
 
-use super::collision::{CollisionWorld, Extent, PLAYER_SOLID, Placed};
+use super::collision::{CollisionWorld, PLAYER_SOLID, Placed};
 use super::movement::{Body, Command, Depth, Mode, STEP, World, extent};
 use super::movers::{Kind, Mover};
 use super::triggers::{Effect, Trigger, along, model_of, triggers};
@@ -12,7 +12,7 @@ use crate::scene::entity_geometry::EntityState;
 use crate::scene::items::{self, PlacedItem};
 use crate::scene::motion::Motion;
 use crate::scene::spawns::Spawn;
-use glam::{Affine3A, Vec3};
+use glam::Vec3;
 
 /// Health at a spawn, and what is taken a second in liquids, at each depth.
 const HEALTH: f32 = 100.0;
@@ -362,14 +362,6 @@ impl Play {
             .filter(|s| s.hidden || s.offset != Vec3::ZERO)
             .collect()
     }
-
-    /// A free way for a point, for what asks whether something is in between.
-    pub fn free(&self, from: Vec3, to: Vec3) -> bool {
-        let trace = self
-            .collision
-            .sweep(Extent::POINT, from, to, content_flags::SOLID, &self.placed);
-        trace.fraction >= 1.0
-    }
 }
 
 /// Seconds until an item that was taken is back; 0 for what is not taken.
@@ -382,14 +374,5 @@ fn seconds_gone(kind: items::Kind) -> f32 {
         items::Kind::Powerup => 120.0,
         items::Kind::Holdable => 60.0,
         items::Kind::Flag => 0.0,
-    }
-}
-
-impl Default for Placed {
-    fn default() -> Self {
-        Self {
-            model: 0,
-            pose: Affine3A::IDENTITY,
-        }
     }
 }

@@ -5,7 +5,7 @@ use super::bvh_upload::{MeshTree, polygon_tree};
 use super::scene_gpu::{RenderError, SceneGpu};
 use crate::gpu::acceleration::{BottomLevel, Refit};
 use crate::gpu::{Access, Buffer, Commands, MemoryKind, Tracker, Use};
-use crate::scene::polygons::Polygon;
+use crate::scene::polygons::{Polygon, Room};
 use crate::scene::static_geometry::Mesh;
 use ash::vk;
 
@@ -56,13 +56,7 @@ impl Polygons {
         polygons: &[Polygon],
     ) -> Result<Option<Mesh>, RenderError> {
         let Some(room) = scene.polygons.room else {
-            let none = crate::scene::polygons::Room {
-                mesh: 0,
-                first_vertex: 0,
-                first_triangle: 0,
-                triangles: 0,
-            };
-            none.shape(&scene.name, polygons, usize::MAX, 0)?;
+            Room::NONE.shape(&scene.name, polygons, usize::MAX, 0)?;
             return Ok(None);
         };
         let shape = room.shape(&scene.name, polygons, scene.material_flags.len(), scene.all_row)?;

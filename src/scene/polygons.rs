@@ -65,6 +65,14 @@ const NO_VERTEX: VertexAttributes = VertexAttributes {
 };
 
 impl Room {
+    /// Of a scene that was loaded without any.
+    pub const NONE: Self = Self {
+        mesh: 0,
+        first_vertex: 0,
+        first_triangle: 0,
+        triangles: 0,
+    };
+
     /// Appends room for so many triangles to a geometry.
     pub fn add(geometry: &mut Geometry, triangles: u32) -> Self {
         let room = Self {
@@ -177,13 +185,7 @@ impl Scene {
     /// # Errors
     /// [`PolygonError`] where there is no room for them.
     pub fn set_polygons(&mut self, polygons: &[Polygon]) -> Result<(), PolygonError> {
-        let none = Room {
-            mesh: 0,
-            first_vertex: 0,
-            first_triangle: 0,
-            triangles: 0,
-        };
-        let room = self.geometry.polygons.unwrap_or(none);
+        let room = self.geometry.polygons.unwrap_or(Room::NONE);
         let shape = room.shape(&self.name, polygons, self.materials.len(), self.rows.all_row)?;
         if self.geometry.polygons.is_none() {
             return Ok(());

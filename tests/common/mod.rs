@@ -5,6 +5,7 @@
 
 pub mod analytic;
 pub mod leaks;
+pub mod small_views;
 pub mod ties;
 
 use glam::Vec3;
