@@ -82,6 +82,7 @@ pub fn run_frames(
                         shadow: share(rays.shadow),
                         shadow_skipped: share(rays.shadow_skipped),
                     },
+                    history: None,
                 })
                 .collect();
             return Ok(Run { film, frames });

@@ -1,50 +1,41 @@
-//! Keys and mouse, independent of the window library's events except for key codes.
+//! What is pressed: buttons by the keys that hold them, the mouse's way, a gamepad's sticks.
 
-use winit::keyboard::KeyCode;
+use crate::console::commands::Button;
 
-/// What a held key does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    Forward,
-    Back,
-    Left,
-    Right,
-    Up,
-    Down,
-    Fast,
+/// Sticks of a gamepad, −1..1 each: up and right are positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sticks {
+    pub walk: [f32; 2],
+    pub look: [f32; 2],
 }
-
-/// Keys by action.
-const BINDINGS: [(KeyCode, Action); 13] = [
-    (KeyCode::KeyW, Action::Forward),
-    (KeyCode::ArrowUp, Action::Forward),
-    (KeyCode::KeyS, Action::Back),
-    (KeyCode::ArrowDown, Action::Back),
-    (KeyCode::KeyA, Action::Left),
-    (KeyCode::ArrowLeft, Action::Left),
-    (KeyCode::KeyD, Action::Right),
-    (KeyCode::ArrowRight, Action::Right),
-    (KeyCode::Space, Action::Up),
-    (KeyCode::KeyC, Action::Down),
-    (KeyCode::ControlLeft, Action::Down),
-    (KeyCode::ShiftLeft, Action::Fast),
-    (KeyCode::ShiftRight, Action::Fast),
-];
 
 /// What is held down now, and how far the mouse has moved.
 #[derive(Default)]
 pub struct Input {
-    held: Vec<KeyCode>,
+    /// Buttons with the keys that hold them; several keys may hold one.
+    held: Vec<(Button, String)>,
+    /// Pressed since the last step: a tap shorter than a frame counts.
+    tapped: Vec<Button>,
     mouse: (f32, f32),
+    pub sticks: Sticks,
 }
 
 impl Input {
-    /// A key went down or up.
-    pub fn key(&mut self, code: KeyCode, down: bool) {
-        self.held.retain(|k| *k != code);
-        if down {
-            self.held.push(code);
-        }
+    /// A key begins to hold a button.
+    pub fn press(&mut self, button: Button, key: &str) {
+        self.release(button, key);
+        self.held.push((button, key.to_owned()));
+        self.tapped.push(button);
+    }
+
+    /// A key holds a button no longer.
+    pub fn release(&mut self, button: Button, key: &str) {
+        self.held.retain(|(b, k)| (*b, k.as_str()) != (button, key));
+    }
+
+    /// A key went up, whatever it held.
+    pub fn release_key(&mut self, key: &str) {
+        self.held.retain(|(_, k)| k != key);
     }
 
     /// The mouse moved by counts, y down.
@@ -58,14 +49,45 @@ impl Input {
         std::mem::take(&mut self.mouse)
     }
 
-    /// Whether a key of the action is down.
-    pub fn held(&self, action: Action) -> bool {
-        BINDINGS.iter().any(|(key, a)| *a == action && self.held.contains(key))
+    /// Whether a button is down, or was since the last step.
+    pub fn held(&self, button: Button) -> bool {
+        self.tapped.contains(&button) || self.held.iter().any(|(b, _)| *b == button)
+    }
+
+    /// 1 where the first button is down, −1 where the other is, 0 where both or neither are.
+    pub fn along(&self, plus: Button, minus: Button) -> f32 {
+        f32::from(self.held(plus)) - f32::from(self.held(minus))
+    }
+
+    /// A step of time has seen what was pressed.
+    pub fn seen(&mut self) {
+        self.tapped.clear();
     }
 
     /// Lets go of everything, as when the window loses the focus.
     pub fn release_all(&mut self) {
-        self.held.clear();
-        self.mouse = (0.0, 0.0);
+        *self = Self::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_button_is_down_while_any_key_holds_it() {
+        let mut input = Input::default();
+        input.press(Button::Forward, "w");
+        input.press(Button::Forward, "UPARROW");
+        input.seen();
+        input.release_key("w");
+        assert!(input.held(Button::Forward));
+        input.release_key("UPARROW");
+        assert!(!input.held(Button::Forward));
+        input.press(Button::MoveUp, "SPACE");
+        input.release_key("SPACE");
+        assert!(input.held(Button::MoveUp), "a tap lasts until a step has seen it");
+        input.seen();
+        assert!(!input.held(Button::MoveUp));
     }
 }

@@ -2,6 +2,8 @@
 
 use super::{bench, common::Common, compare, info, lights, maps, merge, play, render};
 use crate::console::Cvars;
+use crate::console::commands::{find, meant};
+use crate::console::cvars::cvar;
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -19,6 +21,9 @@ pub enum CliError {
     /// Exit code 2.
     #[error("{0}")]
     Usage(String),
+    /// No window can be opened: a run without one may do.
+    #[error("{0}")]
+    NoWindow(String),
 }
 
 impl CliError {
@@ -65,9 +70,21 @@ enum Command {
 
 /// Console words taken off the command line.
 #[derive(Default)]
-struct ConsoleWords {
-    sets: Vec<(String, String)>,
-    commands: Vec<Vec<String>>,
+pub struct ConsoleWords {
+    /// Variables and their values.
+    pub sets: Vec<(String, String)>,
+    /// Other commands with their arguments.
+    pub commands: Vec<Vec<String>>,
+}
+
+impl ConsoleWords {
+    /// The map that the last `+map NAME` names.
+    pub fn map(&self) -> Option<String> {
+        self.commands.iter().rev().find_map(|words| match &words[..] {
+            [command, name] if matches!(command.as_str(), "map" | "devmap") => Some(name.to_lowercase()),
+            _ => None,
+        })
+    }
 }
 
 /// Splits `+set NAME VALUE` and `+COMMAND ARGS…` from the ordinary arguments. A console command's arguments end at the
@@ -120,14 +137,23 @@ fn dispatch() -> CliResult {
             Err(e) => return Err(CliError::Usage(e.to_string())),
         }
     }
-    let mut map = None;
     for words in &console.commands {
-        match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-            ["map" | "devmap", name] => map = Some(name.to_owned()),
-            ["quit"] => return Ok(()),
+        let name = words[0].as_str();
+        match &words[1..] {
+            [] if name == "quit" => return Ok(()),
+            [_] if matches!(name, "map" | "devmap") => {}
+            _ if matches!(name, "map" | "devmap") => {
+                return Err(CliError::Usage(format!("+{name} needs the name of a map")));
+            }
+            // What the window's console does.
+            _ if matches!(cli.command, None | Some(Command::Play(_)))
+                && (find(name).is_some() || cvar(name).is_some()) => {}
             _ => {
+                let hint = meant(name)
+                    .map(|n| format!(" (did you mean +{n}?)"))
+                    .unwrap_or_default();
                 return Err(CliError::Usage(format!(
-                    "unknown console command \"+{}\" (known here: +set, +map NAME, +devmap NAME, +quit)",
+                    "\"+{}\" is no console command that can be used here{hint}",
                     words.join(" ")
                 )));
             }
@@ -142,8 +168,8 @@ fn dispatch() -> CliResult {
         Some(Command::Bench(args)) => bench::run(&cli.common, &cvars, &args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
-        Some(Command::Play(args)) => play::run(&cli.common, cvars, args, map),
-        None => play::run(&cli.common, cvars, play::Args::default(), map),
+        Some(Command::Play(args)) => play::run(&cli.common, cvars, args, console),
+        None => play::run(&cli.common, cvars, play::Args::default(), console),
     }
 }
 

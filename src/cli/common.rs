@@ -1,6 +1,7 @@
 //! Options that every sub-command takes, and what follows from them.
 
 use super::args::CliError;
+use crate::app::folders::Folders;
 use crate::assets::vfs::{FileSource, Install, Vfs};
 use crate::console::Cvars;
 use crate::console::settings::lights;
@@ -12,7 +13,6 @@ use crate::recovery::Options;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
 use crate::scene::player::Player;
-use directories::ProjectDirs;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
@@ -34,6 +34,9 @@ pub struct Common {
     /// Seed of all random numbers (the same as +set rt_seed)
     #[arg(long, global = true, value_name = "N", allow_hyphen_values = true)]
     pub seed: Option<String>,
+    /// Folder for settings, recordings, screenshots, recovered lights and all else that is kept
+    #[arg(long, global = true, value_name = "DIR")]
+    pub home: Option<PathBuf>,
     /// Body that mirrors show, and with it a weapon before the eye; in `play`, sarge where there is one
     #[arg(long, global = true, value_name = "MODEL[/SKIN]")]
     pub player: Option<String>,
@@ -42,14 +45,19 @@ pub struct Common {
 impl Common {
     /// Puts options that stand for variables into them.
     pub fn apply(&self, cvars: &mut Cvars) -> Result<(), CliError> {
-        let pairs = [("rt_backend", &self.backend), ("rt_seed", &self.seed)];
-        for (name, value) in pairs {
-            if let Some(value) = value {
-                let note = cvars.set(name, value).map_err(|e| CliError::Usage(e.to_string()))?;
-                note.into_iter().for_each(|n| eprintln!("{n}"));
-            }
+        for (name, value) in self.sets() {
+            let note = cvars.set(name, value).map_err(|e| CliError::Usage(e.to_string()))?;
+            note.into_iter().for_each(|n| eprintln!("{n}"));
         }
         Ok(())
+    }
+
+    /// Options that stand for variables, with their values.
+    pub fn sets(&self) -> impl Iterator<Item = (&str, &str)> {
+        let pairs = [("rt_backend", &self.backend), ("rt_seed", &self.seed)];
+        pairs
+            .into_iter()
+            .filter_map(|(name, value)| Some((name, value.as_deref()?)))
     }
 
     /// Mounts the game files.
@@ -80,19 +88,33 @@ impl Common {
     pub fn scene(&self, map: &str) -> Result<Scene, CliError> {
         let files = self.files()?.focused_on(map);
         let scene = Scene::load(&files, map).map_err(CliError::failed)?;
-        report_warnings(&scene);
+        tell_warnings(&scene, &|text| eprintln!("warning: {text}"));
         Ok(scene)
     }
 
     /// Loads a map with the lights that the variables ask for, and the player that the options name.
     pub fn lit_scene(&self, map: &str, cvars: &Cvars) -> Result<(Scene, Lighting), CliError> {
         let files = self.files()?.focused_on(map);
-        self.lit_scene_with(&files, map, cvars, self.player.as_deref().map(player))
+        with_bar(map, &|news| {
+            self.lit_scene_with(&files, map, cvars, self.player.as_deref().map(player), news)
+        })
     }
 
     /// The same for somebody who plays: the default player where none is named and its files are there.
     pub fn played_scene(&self, map: &str, cvars: &Cvars) -> Result<(Scene, Lighting), CliError> {
-        let files = self.files()?.focused_on(map);
+        let files = self.files()?;
+        with_bar(map, &|news| self.played_scene_from(&files, map, cvars, news))
+    }
+
+    /// The same from files that are mounted already.
+    pub fn played_scene_from(
+        &self,
+        files: &Vfs,
+        map: &str,
+        cvars: &Cvars,
+        news: &LoadNews<'_>,
+    ) -> Result<(Scene, Lighting), CliError> {
+        let files = files.focused_on(map);
         let there = |p: &Player| {
             let path = format!("models/players/{}/lower.md3", p.model);
             matches!(files.read(&path), Ok(Some(_)))
@@ -101,7 +123,7 @@ impl Common {
             Some(name) => Some(player(name)),
             None => Some(Player::default()).filter(there),
         };
-        self.lit_scene_with(&files, map, cvars, player)
+        self.lit_scene_with(&files, map, cvars, player, news)
     }
 
     fn lit_scene_with(
@@ -110,29 +132,49 @@ impl Common {
         map: &str,
         cvars: &Cvars,
         player: Option<Player>,
+        news: &LoadNews<'_>,
     ) -> Result<(Scene, Lighting), CliError> {
         let options = LoadOptions {
             player,
             ..LoadOptions::default()
         };
         let mut scene = Scene::load_with(files, map, &options).map_err(CliError::failed)?;
-        report_warnings(&scene);
-        let bar = progress(RECOVERY_STEPS, &format!("{map}: lights"));
+        tell_warnings(&scene, news.warn);
+        // Beside the configuration.
+        let folder = Folders::new(self.home.as_deref()).config.join("lights");
         let lit = lighting::light(
             &mut scene,
             files,
             lights(cvars),
-            &lights_folder(),
+            &folder,
             &Options::default(),
-            &|share| bar.set_position((share * RECOVERY_STEPS as f32) as u64),
+            news.share,
         );
-        bar.finish_and_clear();
         let lit = lit.map_err(CliError::failed)?;
         if let Some(warning) = lit.loaded.as_ref().and_then(|l| l.warning.as_ref()) {
-            eprintln!("warning: {warning}");
+            (news.warn)(warning);
         }
         Ok((scene, lit))
     }
+}
+
+/// Who hears of a loading.
+pub struct LoadNews<'a> {
+    /// Share of the search for lights that is done.
+    pub share: &'a (dyn Fn(f32) + Sync),
+    /// What is missing or damaged, one sentence each.
+    pub warn: &'a dyn Fn(&str),
+}
+
+/// A loading with a bar and warnings on the terminal.
+fn with_bar<T>(map: &str, load: &dyn Fn(&LoadNews<'_>) -> Result<T, CliError>) -> Result<T, CliError> {
+    let bar = progress(RECOVERY_STEPS, &format!("{map}: lights"));
+    let loaded = load(&LoadNews {
+        share: &|share| bar.set_position((share * RECOVERY_STEPS as f32) as u64),
+        warn: &|text| bar.suspend(|| eprintln!("warning: {text}")),
+    });
+    bar.finish_and_clear();
+    loaded
 }
 
 /// The player of a MODEL[/SKIN].
@@ -148,26 +190,18 @@ fn player(name: &str) -> Player {
 /// Steps of the bar that recovering lights moves.
 const RECOVERY_STEPS: u64 = 1000;
 
-/// Where recovered lights are kept: beside the configuration, or for this run alone where there is no home.
-fn lights_folder() -> PathBuf {
-    match ProjectDirs::from("", "", "q3rays") {
-        Some(folders) => folders.config_dir().join("lights"),
-        None => std::env::temp_dir().join("q3rays-lights"),
-    }
-}
-
 /// Warnings of a map that are told one by one.
 const WARNINGS_SHOWN: usize = 5;
 
-fn report_warnings(scene: &Scene) {
+fn tell_warnings(scene: &Scene, warn: &dyn Fn(&str)) {
     for warning in scene.warnings.iter().take(WARNINGS_SHOWN) {
-        eprintln!("warning: {}: {warning}", scene.name);
+        warn(&format!("{}: {warning}", scene.name));
     }
     if let Some(more @ 1..) = scene.warnings.len().checked_sub(WARNINGS_SHOWN) {
-        eprintln!(
-            "warning: {}: and {more} more (see `q3rays info {}`)",
+        warn(&format!(
+            "{}: and {more} more (see `q3rays info {}`)",
             scene.name, scene.name
-        );
+        ));
     }
 }
 

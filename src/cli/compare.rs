@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> CliResult {
     let metrics = compare(&a, &b, kind_a, mask.as_deref()).map_err(CliError::failed)?;
     if let Some(path) = &args.heatmap {
         let map = heatmap(&a, &b, kind_a).map_err(CliError::failed)?;
-        png_file::write(path, a.width as u32, a.height as u32, &map).map_err(CliError::failed)?;
+        png_file::write(path, a.width as u32, a.height as u32, &map, &[]).map_err(CliError::failed)?;
     }
     stdout::line(serde_json::to_string_pretty(&metrics).map_err(CliError::failed)?).map_err(CliError::failed)
 }

@@ -1,13 +1,17 @@
 //! `q3rays` and `q3rays play`
 
-use super::args::{CliError, CliResult};
-use super::common::{Common, progress};
-use crate::app::{headless, window};
-use crate::console::Cvars;
+use super::args::{CliError, CliResult, ConsoleWords};
+use super::common::{Common, LoadNews, progress};
+use crate::app::folders::Folders;
+use crate::app::window::{Start, StatsRun};
+use crate::app::{MapSource, headless, window};
+use crate::console::config::{AUTOEXEC, Config};
+use crate::console::tokens::quoted;
+use crate::console::{Cvars, Shell};
 use crate::content::fly_through;
-use crate::engine::Engine;
 use crate::output::stdout;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Map that is played where none is named.
 const DEFAULT_MAP: &str = fly_through::MAP;
@@ -19,35 +23,95 @@ const OUT: &str = "q3rays-out";
 pub struct Args {
     /// Map name; the map that ships with the program if none is given
     map: Option<String>,
+    /// Write the times of all frames: .json or .csv
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
     /// Close the window after so many frames
     #[arg(long, value_name = "N", hide = true)]
     frames: Option<u32>,
 }
 
-/// Opens the window on a map, or does a run without one where there is no display.
-pub fn run(common: &Common, cvars: Cvars, args: Args, map: Option<String>) -> CliResult {
-    let map = args.map.or(map).unwrap_or_else(|| DEFAULT_MAP.to_owned());
+/// Opens the window on a map, or does a run without one where there is no display. `cvars`: as the command line sets them.
+pub fn run(common: &Common, cvars: Cvars, args: Args, words: ConsoleWords) -> CliResult {
+    let map = words
+        .map()
+        .or(args.map.clone())
+        .unwrap_or_else(|| DEFAULT_MAP.to_owned());
+    if window::has_display() && cvars.get("rt_backend").as_deref() != Some("cpu") {
+        match in_window(common, &map, &args, &words) {
+            Err(CliError::NoWindow(reason)) => eprintln!("{reason}"),
+            done => return done,
+        }
+    } else if cvars.get("rt_backend").as_deref() == Some("cpu") {
+        stdout::line("the window needs a Vulkan device: running without one").map_err(CliError::failed)?;
+    } else {
+        stdout::line("no display: running without a window").map_err(CliError::failed)?;
+    }
     let (scene, _) = common.played_scene(&map, &cvars)?;
     let engine = common.engine(&cvars)?;
-    match engine {
-        Engine::Vulkan { .. } if window::has_display() => {
-            // The window needs a device that can present, which is opened with it.
-            drop(engine);
-            return window::run(window::Options {
-                scene,
-                cvars,
-                device: common.device.clone(),
-                frames: args.frames,
-            });
-        }
-        Engine::Vulkan { .. } => stdout::line("no display: running without a window"),
-        Engine::Cpu => stdout::line("the window needs a Vulkan device: running without one"),
-    }
-    .map_err(CliError::failed)?;
     let bar = progress(1000, &map);
     let done = headless::run(&engine, &scene, &cvars, Path::new(OUT), &|share| {
         bar.set_position((share * 1000.0) as u64);
     });
     bar.finish_and_clear();
     done
+}
+
+fn in_window(common: &Common, map: &str, args: &Args, words: &ConsoleWords) -> CliResult {
+    let folders = Folders::new(common.home.as_deref());
+    let files = Arc::new(common.files()?);
+    let mut shell = Shell::default();
+    let (mut config, message) = Config::load(&folders.config, &mut shell);
+    if let Some(message) = message {
+        eprintln!("warning: {message}");
+        shell.log.warn(message);
+    }
+    for (name, value) in words
+        .sets
+        .iter()
+        .map(|(n, v)| (n.as_str(), v.as_str()))
+        .chain(common.sets())
+    {
+        let note = config
+            .set_for_this_run(&mut shell.cvars, name, value)
+            .map_err(CliError::Usage)?;
+        note.into_iter().for_each(|n| eprintln!("{n}"));
+    }
+    if folders.config.join(AUTOEXEC).is_file() {
+        shell.push(&format!("exec {AUTOEXEC}"));
+    }
+    for words in words
+        .commands
+        .iter()
+        .filter(|w| !matches!(w[0].as_str(), "map" | "devmap"))
+    {
+        let words: Vec<String> = words.iter().map(|w| quoted(w)).collect();
+        shell.push(&words.join(" "));
+    }
+    let load = {
+        let (common, files) = (common.clone(), files.clone());
+        move |map: &str, cvars: &Cvars, report: &(dyn Fn(&str, f32) + Sync)| {
+            let news = LoadNews {
+                share: &|share| report("finding its lights", 0.3 + 0.7 * share),
+                warn: &|_| {},
+            };
+            let loaded = common.played_scene_from(&files, map, cvars, &news);
+            loaded.map(|(scene, _)| scene).map_err(|e| e.to_string())
+        }
+    };
+    window::run(Start {
+        source: MapSource {
+            files,
+            load: Arc::new(load),
+        },
+        folders,
+        config,
+        shell,
+        map: map.to_owned(),
+        device: common.device.clone().unwrap_or_else(|| "auto".to_owned()),
+        frames: args.frames,
+        stats: args.stats.clone().map(StatsRun::new),
+        resume: None,
+        lost: None,
+    })
 }

@@ -171,6 +171,7 @@ fn accumulation_stats(start: Instant, rays: RayCounts) -> FrameStats {
         gpu_ms: None,
         passes: serde_json::Map::new(),
         rays,
+        history: None,
     }
 }
 

@@ -4,4 +4,5 @@ pub mod collision;
 pub mod movement;
 pub mod movers;
 pub mod play;
+pub mod recording;
 pub mod triggers;

@@ -46,7 +46,7 @@ pub const CROUCHED_EYE: f32 = 12.0;
 const STEP_VIEW_RATE: f32 = 12.0;
 
 /// How somebody moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Mode {
     #[default]
     Walk,
@@ -57,7 +57,7 @@ pub enum Mode {
 }
 
 /// What somebody wants, −1..1 each, and where they look, degrees.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Command {
     pub forward: f32,
     pub right: f32,
@@ -85,7 +85,7 @@ impl World<'_> {
 }
 
 /// How deep in a liquid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Depth {
     #[default]
     Dry,
@@ -95,7 +95,7 @@ pub enum Depth {
 }
 
 /// A player's body.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Body {
     /// The middle of the feet is 24 below.
     pub origin: Vec3,
@@ -121,7 +121,7 @@ pub struct Body {
 }
 
 /// What somebody stands on or slides down.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ground {
     pub normal: Vec3,
     /// Flat enough to walk.

@@ -21,7 +21,7 @@ pub enum Kind {
 }
 
 /// Where it is on its way.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 enum State {
     Resting,
     Going,
@@ -31,7 +31,7 @@ enum State {
 }
 
 /// A moment of a mover's way.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct WayNow(State, f32);
 
 /// A brush model between two places.
@@ -162,7 +162,12 @@ impl Mover {
         }
     }
 
-    /// Where on its way it is, for [`Self::turn_back`].
+    /// Puts it where it was.
+    pub fn set_way(&mut self, was: WayNow) {
+        (self.state, self.share) = (was.0, was.1.clamp(0.0, 1.0));
+    }
+
+    /// Where on its way it is, for [`Self::turn_back`] and [`Self::set_way`].
     pub fn way_now(&self) -> WayNow {
         WayNow(self.state, self.share)
     }

@@ -2,7 +2,7 @@
 
 use super::collision::{CollisionWorld, PLAYER_SOLID, Placed};
 use super::movement::{Body, Command, Depth, Mode, STEP, World, extent};
-use super::movers::{Kind, Mover};
+use super::movers::{Kind, Mover, WayNow};
 use super::triggers::{Effect, Trigger, along, model_of, triggers};
 use crate::assets::bsp::lumps::content_flags;
 use crate::assets::bsp::{Bounds, Bsp};
@@ -58,6 +58,20 @@ struct Driven {
     motion: Motion,
 }
 
+/// Everything about a [`Play`] that changes, to go on from later.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct PlayState {
+    body: Body,
+    health: f32,
+    next_spawn: usize,
+    behind: f32,
+    /// Scene time of the last step.
+    stepped: Clock,
+    movers: Vec<WayNow>,
+    /// Seconds until each item is back.
+    items: Vec<f32>,
+}
+
 /// A map with somebody in it.
 pub struct Play {
     pub collision: CollisionWorld,
@@ -74,6 +88,8 @@ pub struct Play {
     placed: Vec<Placed>,
     /// Time not yet stepped through, seconds.
     behind: f32,
+    /// Scene time of the last step.
+    stepped: Clock,
     frozen: bool,
 }
 
@@ -94,6 +110,7 @@ impl Play {
             bounds: bsp.world_bounds(),
             placed: Vec::new(),
             behind: 0.0,
+            stepped: Clock::default(),
             frozen: false,
             body: Body::default(),
             health: HEALTH,
@@ -138,6 +155,38 @@ impl Play {
         yaw
     }
 
+    /// All that changes, as it is now.
+    pub fn state(&self) -> PlayState {
+        PlayState {
+            body: self.body,
+            health: self.health,
+            next_spawn: self.next_spawn,
+            behind: self.behind,
+            stepped: self.stepped,
+            movers: self.movers.iter().map(Mover::way_now).collect(),
+            items: self.items.iter().map(|i| i.gone).collect(),
+        }
+    }
+
+    /// Goes on from a state of the same map. False, and nothing changed, where it is another map's.
+    pub fn restore(&mut self, state: &PlayState) -> bool {
+        if (state.movers.len(), state.items.len()) != (self.movers.len(), self.items.len()) {
+            return false;
+        }
+        (self.body, self.health) = (state.body, state.health);
+        (self.next_spawn, self.behind) = (state.next_spawn, state.behind);
+        self.movers
+            .iter_mut()
+            .zip(&state.movers)
+            .for_each(|(m, was)| m.set_way(*was));
+        self.items
+            .iter_mut()
+            .zip(&state.items)
+            .for_each(|(i, gone)| i.gone = *gone);
+        self.place(state.stepped);
+        true
+    }
+
     /// Lets `seconds` go by, the scene's time being `clock` at their end; what is left over is made up for later. In a scene that is
     /// `frozen` nothing moves but the player.
     pub fn advance(&mut self, seconds: f32, clock: Clock, frozen: bool, command: &Command) -> Vec<Event> {
@@ -179,6 +228,7 @@ impl Play {
     }
 
     fn place(&mut self, clock: Clock) {
+        self.stepped = clock;
         self.placed.clear();
         let movers = self.movers.iter().map(|m| Placed {
             model: m.model,

@@ -63,7 +63,7 @@ pub struct Limits {
 /// All objects made from it hold an `Arc` of it. Waits for the GPU and is destroyed on drop, unless adopted.
 pub struct Device {
     raw: ash::Device,
-    allocator: ManuallyDrop<Mutex<Allocator>>,
+    allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     queue: Arc<Mutex<vk::Queue>>,
     queue_family: u32,
     physical: vk::PhysicalDevice,
@@ -155,7 +155,7 @@ impl Device {
         };
         let limits = query_limits(&instance, report.raw, queue_family, enabled.ray_query);
         let device = Self {
-            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             queue,
             queue_family,
             physical: report.raw,
@@ -265,6 +265,11 @@ impl Device {
     /// An identity for a resource, never used twice on this device.
     pub fn new_resource_id(&self) -> ResourceId {
         ResourceId::new(self.next_id.fetch_add(1, Ordering::Relaxed))
+    }
+
+    /// The memory allocator, for libraries that bring their own objects. Whoever keeps it keeps the device, too, and longer.
+    pub fn allocator(&self) -> Arc<Mutex<Allocator>> {
+        Arc::clone(&self.allocator)
     }
 
     pub(super) fn allocate(

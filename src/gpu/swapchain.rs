@@ -58,6 +58,7 @@ pub struct Swapchain {
     mode: PresentMode,
     frames: usize,
     stale: bool,
+    renewed: bool,
 }
 
 impl Swapchain {
@@ -89,6 +90,7 @@ impl Swapchain {
             mode,
             frames: frames.max(1),
             stale: true,
+            renewed: false,
         };
         swapchain.recreate()?;
         Ok(swapchain)
@@ -104,6 +106,11 @@ impl Swapchain {
     pub fn set_mode(&mut self, mode: PresentMode) {
         self.stale |= self.mode != mode;
         self.mode = mode;
+    }
+
+    /// Whether the images were made anew since the last call: what was made from the old ones is of no use any more.
+    pub fn take_renewed(&mut self) -> bool {
+        std::mem::take(&mut self.renewed)
     }
 
     /// Size of the images in pixels.
@@ -266,6 +273,7 @@ impl Swapchain {
         self.rendered = self.semaphores(self.images.len())?;
         self.extent = extent;
         self.stale = false;
+        self.renewed = true;
         Ok(true)
     }
 

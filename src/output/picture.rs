@@ -25,7 +25,7 @@ pub fn write(path: &Path, film: &Film, settings: &Settings) -> Result<(), Output
                 .iter()
                 .map(|p| display(*p, exposure, settings.tonemap))
                 .collect();
-            png_file::write(path, film.width, film.height, &pixels)
+            png_file::write(path, film.width, film.height, &pixels, &[])
         }
         _ => Err(OutputError::Extension { path: path.to_owned() }),
     }

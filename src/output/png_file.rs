@@ -1,21 +1,35 @@
 //! PNG images of the display.
 
 use super::{OutputError, atomic};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::path::Path;
 
-/// Writes 8-bit sRGB pixels, row by row from the top.
+/// Writes 8-bit sRGB pixels, row by row from the top, with text chunks of a keyword and a text.
 ///
 /// # Errors
 /// [`OutputError`] naming the file.
-pub fn write(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<(), OutputError> {
+pub fn write(
+    path: &Path,
+    width: u32,
+    height: u32,
+    pixels: &[[u8; 3]],
+    texts: &[(&str, String)],
+) -> Result<(), OutputError> {
     let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes)
-        .write_image(bytemuck::cast_slice(pixels), width, height, ExtendedColorType::Rgb8)
-        .map_err(|e| OutputError::Encode {
-            path: path.to_owned(),
-            reason: e.to_string(),
-        })?;
+    let encoded = (|| {
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        for (keyword, text) in texts {
+            encoder.add_itxt_chunk((*keyword).to_owned(), text.clone())?;
+        }
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(bytemuck::cast_slice(pixels))?;
+        writer.finish()
+    })();
+    encoded.map_err(|e: png::EncodingError| OutputError::Encode {
+        path: path.to_owned(),
+        reason: e.to_string(),
+    })?;
     atomic::write(path, &bytes)
 }
 

@@ -16,6 +16,9 @@ pub struct FrameStats {
     /// GPU time by pass.
     pub passes: serde_json::Map<String, serde_json::Value>,
     pub rays: RayCounts,
+    /// Mean number of frames in the denoiser's history; `None` where nothing was denoised.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub history: Option<f64>,
 }
 
 /// Percentiles over the frames: of GPU time where there is one, else of CPU time; milliseconds.

@@ -236,7 +236,7 @@ impl FrameRenderer {
             None => self.direct.record(&mut r, &view.counters[slot], &view.strata)?,
         }
         if denoises {
-            self.temporal.record(&mut r)?;
+            self.temporal.record(&mut r, &view.counters[slot])?;
             self.atrous.record(&mut r, input.settings.shown_levels())?;
         }
         self.composite.record(&mut r)?;

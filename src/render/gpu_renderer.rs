@@ -126,7 +126,7 @@ impl<'a> GpuRenderer<'a> {
             self.accumulate_one(&mut view, &now, &settings.at_sample(index), index, n as u32 + 1)?;
             progress((n + 1) as f32 / count as f32);
         }
-        let mut counts = view.take_counts(0)?;
+        let (mut counts, _) = view.take_counts(0)?;
         counts.primary = u64::from(size.0) * u64::from(size.1) * u64::from(count);
         Ok((film(&view, count)?, counts))
     }

@@ -56,6 +56,29 @@ impl Realtime {
         Ok(())
     }
 
+    /// Makes the view anew: no history of what it has shown is left.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn forget(&mut self) -> Result<(), RenderError> {
+        self.ring.wait()?;
+        let size = self.view.gbuffer.size;
+        self.view = ViewState::new(&self.scene.device, &self.frames.view_layout, size, FRAMES_IN_FLIGHT)?;
+        Ok(())
+    }
+
+    /// Makes all passes anew from their shaders; with the feature `compile-shaders` these are compiled now. The old ones stay where that
+    /// fails.
+    ///
+    /// # Errors
+    /// [`RenderError`], a shader that does not compile above all.
+    pub fn reload_shaders(&mut self, cache: Option<&PipelineCache>) -> Result<(), RenderError> {
+        let frames = FrameRenderer::new(&self.scene, cache)?;
+        self.ring.wait()?;
+        self.frames = frames;
+        Ok(())
+    }
+
     /// Renders a frame. `show` records what happens to the display image and submits the frame; `false` from it means
     /// that there is nowhere to show it now. Returns the statistics of an earlier frame that has ended meanwhile.
     ///
@@ -134,7 +157,7 @@ fn take_stats(
     let Some((_, cpu_ms)) = cpu_times.pop_front() else {
         return Ok(None);
     };
-    let mut rays = view.take_counts(slot)?;
+    let (mut rays, history) = view.take_counts(slot)?;
     rays.primary = u64::from(view.gbuffer.size.0) * u64::from(view.gbuffer.size.1);
     let scopes = frame.timings().map(|t| t.scopes.as_slice()).unwrap_or_default();
     let gpu_ms = scopes.iter().find(|s| s.name == WHOLE_FRAME).map(|s| s.milliseconds);
@@ -149,5 +172,6 @@ fn take_stats(
         gpu_ms,
         passes,
         rays,
+        history,
     }))
 }

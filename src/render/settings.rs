@@ -97,7 +97,7 @@ pub struct Settings {
     /// Multiplier before the tone map; 0: automatic.
     pub exposure: f32,
     pub tonemap: Tonemap,
-    /// Index into [`crate::console::cvars::VIEWS`].
+    /// Index into [`crate::console::table::VIEWS`].
     pub view: u32,
     /// Denoise frames that are shown as they come.
     pub denoiser: bool,
@@ -203,7 +203,7 @@ impl Settings {
 pub const BRANCH_CANDIDATES: u32 = 2;
 /// Most levels of the denoiser's filter.
 const MOST_LEVELS: u32 = 5;
-/// First of the views of the denoiser's filter levels in [`crate::console::cvars::VIEWS`].
+/// First of the views of the denoiser's filter levels in [`crate::console::table::VIEWS`].
 const FIRST_LEVEL_VIEW: u32 = 18;
 
 impl Settings {

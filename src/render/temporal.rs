@@ -2,7 +2,7 @@
 //! Shader: `shaders/temporal.comp`.
 
 use super::pass::{Pass, PassContext, Recorder};
-use crate::gpu::{Access, GpuError, Use};
+use crate::gpu::{Access, Buffer, GpuError, Use};
 
 /// The pass.
 pub struct Temporal(Pass);
@@ -20,7 +20,7 @@ impl Temporal {
     ///
     /// # Errors
     /// [`GpuError`] of the device.
-    pub fn record(&self, r: &mut Recorder<'_>) -> Result<(), GpuError> {
+    pub fn record(&self, r: &mut Recorder<'_>, counters: &Buffer) -> Result<(), GpuError> {
         let g = r.gbuffer;
         let read = [
             g.direct(),
@@ -34,6 +34,7 @@ impl Temporal {
         let written = [g.filter_a(), g.irradiance().now(g.parity), g.moments().now(g.parity)];
         let mut uses: Vec<_> = read.map(|i| Use::image(i, Access::ComputeRead)).into();
         uses.extend(written.map(|i| Use::image(i, Access::ComputeWrite)));
+        uses.push(Use::buffer(counters, Access::ComputeReadWrite));
         self.0.record_image(r, &uses)
     }
 }

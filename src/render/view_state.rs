@@ -15,8 +15,9 @@ use crate::scene::entity_geometry::EntityState;
 use ash::vk;
 use std::sync::Arc;
 
-/// Words of the counters buffer: 64 bits each for shadow rays and skipped light samples.
-const COUNTER_WORDS: u64 = 4;
+/// Words of the counters buffer: 64 bits each for shadow rays and skipped light samples, then the sum of the history lengths of some
+/// pixels and how many these are.
+const COUNTER_WORDS: u64 = 6;
 
 /// State of one view. One scene serves any number of them; each belongs to one caller at a time.
 pub struct ViewState {
@@ -119,18 +120,21 @@ impl ViewState {
         Ok(self.secondary_pixels.insert(made))
     }
 
-    /// Reads and clears the counters of a frame that has ended.
+    /// Reads and clears the counters of a frame that has ended: its rays, and the mean length of its denoiser's history in frames where
+    /// it was denoised.
     ///
     /// # Errors
     /// [`GpuError`] where the memory cannot be read.
-    pub fn take_counts(&mut self, slot: usize) -> Result<RayCounts, GpuError> {
+    pub fn take_counts(&mut self, slot: usize) -> Result<(RayCounts, Option<f64>), GpuError> {
         let words: Vec<u32> = self.counters[slot].read()?;
         self.counters[slot].write(0, &[0u32; COUNTER_WORDS as usize])?;
         let pair = |i: usize| u64::from(words[i]) | u64::from(words[i + 1]) << 32;
-        Ok(RayCounts {
+        let rays = RayCounts {
             primary: 0,
             shadow: pair(0),
             shadow_skipped: pair(2),
-        })
+        };
+        let history = (words[5] > 0).then(|| f64::from(words[4]) / f64::from(words[5]));
+        Ok((rays, history))
     }
 }

@@ -88,6 +88,12 @@ impl Camera {
         }
     }
 
+    /// Whether all its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let angles = [self.pitch, self.yaw, self.roll, self.fov];
+        self.eye.iter().chain(&angles).all(|x| x.is_finite())
+    }
+
     /// Unit axes: forward, right (−y at yaw 0), up.
     pub fn axes(&self) -> Axes {
         let (sp, cp) = sin_cos_degrees(self.pitch);

@@ -10,7 +10,7 @@ pub const TICKS: f64 = 16_384.0;
 pub const NOISE_STEPS: f32 = 256.0;
 
 /// A moment; wraps after three days.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Clock(pub u32);
 
 impl Clock {

@@ -30,7 +30,7 @@ pub struct Placement {
 }
 
 /// How an entity is otherwise than the map and the clock have it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct EntityState {
     /// Its number in the map's list.
     pub entity: u32,

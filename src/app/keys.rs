@@ -1,0 +1,131 @@
+//! The window library's keys by the names that the console knows.
+
+use winit::event::{MouseButton, MouseScrollDelta};
+use winit::keyboard::KeyCode;
+
+/// Name of a key by its place on the keyboard, as on an American one; `None` for keys that cannot be bound.
+pub fn name(code: KeyCode) -> Option<&'static str> {
+    use KeyCode as K;
+    Some(match code {
+        K::KeyA => "a",
+        K::KeyB => "b",
+        K::KeyC => "c",
+        K::KeyD => "d",
+        K::KeyE => "e",
+        K::KeyF => "f",
+        K::KeyG => "g",
+        K::KeyH => "h",
+        K::KeyI => "i",
+        K::KeyJ => "j",
+        K::KeyK => "k",
+        K::KeyL => "l",
+        K::KeyM => "m",
+        K::KeyN => "n",
+        K::KeyO => "o",
+        K::KeyP => "p",
+        K::KeyQ => "q",
+        K::KeyR => "r",
+        K::KeyS => "s",
+        K::KeyT => "t",
+        K::KeyU => "u",
+        K::KeyV => "v",
+        K::KeyW => "w",
+        K::KeyX => "x",
+        K::KeyY => "y",
+        K::KeyZ => "z",
+        K::Digit0 => "0",
+        K::Digit1 => "1",
+        K::Digit2 => "2",
+        K::Digit3 => "3",
+        K::Digit4 => "4",
+        K::Digit5 => "5",
+        K::Digit6 => "6",
+        K::Digit7 => "7",
+        K::Digit8 => "8",
+        K::Digit9 => "9",
+        K::Backquote => "`",
+        K::Minus => "-",
+        K::Equal => "=",
+        K::BracketLeft => "[",
+        K::BracketRight => "]",
+        K::Backslash | K::IntlBackslash => "\\",
+        K::Semicolon => "SEMICOLON",
+        K::Quote => "'",
+        K::Comma => ",",
+        K::Period => ".",
+        K::Slash => "/",
+        K::Tab => "TAB",
+        K::Enter => "ENTER",
+        K::Escape => "ESCAPE",
+        K::Space => "SPACE",
+        K::Backspace => "BACKSPACE",
+        K::ArrowUp => "UPARROW",
+        K::ArrowDown => "DOWNARROW",
+        K::ArrowLeft => "LEFTARROW",
+        K::ArrowRight => "RIGHTARROW",
+        K::AltLeft | K::AltRight => "ALT",
+        K::ControlLeft | K::ControlRight => "CTRL",
+        K::ShiftLeft | K::ShiftRight => "SHIFT",
+        K::CapsLock => "CAPSLOCK",
+        K::Insert => "INS",
+        K::Delete => "DEL",
+        K::PageDown => "PGDN",
+        K::PageUp => "PGUP",
+        K::Home => "HOME",
+        K::End => "END",
+        K::Pause => "PAUSE",
+        K::F1 => "F1",
+        K::F2 => "F2",
+        K::F3 => "F3",
+        K::F4 => "F4",
+        K::F5 => "F5",
+        K::F6 => "F6",
+        K::F7 => "F7",
+        K::F8 => "F8",
+        K::F9 => "F9",
+        K::F10 => "F10",
+        K::F11 => "F11",
+        K::F12 => "F12",
+        K::Numpad7 => "KP_HOME",
+        K::Numpad8 => "KP_UPARROW",
+        K::Numpad9 => "KP_PGUP",
+        K::Numpad4 => "KP_LEFTARROW",
+        K::Numpad5 => "KP_5",
+        K::Numpad6 => "KP_RIGHTARROW",
+        K::Numpad1 => "KP_END",
+        K::Numpad2 => "KP_DOWNARROW",
+        K::Numpad3 => "KP_PGDN",
+        K::NumpadEnter => "KP_ENTER",
+        K::Numpad0 => "KP_INS",
+        K::NumpadDecimal => "KP_DEL",
+        K::NumpadDivide => "KP_SLASH",
+        K::NumpadSubtract => "KP_MINUS",
+        K::NumpadAdd => "KP_PLUS",
+        _ => return None,
+    })
+}
+
+/// Name of a mouse button.
+pub fn button_name(button: MouseButton) -> Option<&'static str> {
+    Some(match button {
+        MouseButton::Left => "MOUSE1",
+        MouseButton::Right => "MOUSE2",
+        MouseButton::Middle => "MOUSE3",
+        MouseButton::Back => "MOUSE4",
+        MouseButton::Forward => "MOUSE5",
+        MouseButton::Other(_) => return None,
+    })
+}
+
+/// Name of a turn of the wheel.
+pub fn wheel_name(delta: MouseScrollDelta) -> Option<&'static str> {
+    let up = match delta {
+        MouseScrollDelta::LineDelta(_, y) => f64::from(y),
+        MouseScrollDelta::PixelDelta(at) => at.y,
+    };
+    match up {
+        up if up > 0.0 => Some("MWHEELUP"),
+        up if up < 0.0 => Some("MWHEELDOWN"),
+        _ => None,
+    }
+}
