@@ -163,6 +163,24 @@ fn wait_lets_frames_go_by() {
 }
 
 #[test]
+fn what_stands_behind_a_map_waits_for_it() {
+    let (mut shell, files) = (Shell::default(), Files::default());
+    shell.push("map a; fly; kill");
+    shell.begin_frame();
+    assert_eq!(shell.step(&files), Some(vec![Action::Map("a".into())]));
+    shell.hold();
+    assert_eq!(
+        shell.execute("noclip", &files),
+        [Action::NoClip],
+        "what is typed runs at once"
+    );
+    assert!(shell.is_busy());
+    shell.push("quit");
+    shell.release();
+    assert_eq!(shell.run(&files), [Action::Fly, Action::Kill, Action::Quit]);
+}
+
+#[test]
 fn any_text_is_survived() {
     use proptest::prelude::*;
     let words: Vec<&str> = COMMANDS

@@ -182,11 +182,12 @@ impl Game {
             self.playback = None;
             return;
         }
-        playback.restart();
-        // The same frames come out each time.
-        if let Err(e) = level.forget() {
+        // The same frames come out each time, and their times are theirs alone.
+        let forgotten = level.realtime.finish().and_then(|_| level.forget());
+        if let Err(e) = forgotten {
             self.shell.log.warn(e);
         }
+        playback.restart();
     }
 
     /// Ends a playback, where there is one, and writes the times of a timed one.

@@ -98,6 +98,7 @@ impl Game {
             loading.abandon();
         }
         let size = self.traced_size();
+        self.shell.hold();
         self.loading = Some(Loading::begin(map, &self.source, &self.shell.cvars, &self.screen, size));
     }
 
@@ -140,13 +141,16 @@ impl Game {
     }
 
     /// Runs what the console has to run.
-    fn run_console(&mut self) {
+    pub(super) fn run_console(&mut self) {
+        let (folder, files) = (self.folders.config.clone(), self.source.files.clone());
         let scripts = UserScripts {
-            folder: &self.folders.config,
-            files: &self.source.files,
+            folder: &folder,
+            files: &files,
         };
-        for action in self.shell.run(&scripts) {
-            self.act(action);
+        self.shell.begin_frame();
+        // One by one, so that each finds what those before it have done.
+        while let Some(actions) = self.shell.step(&scripts) {
+            actions.into_iter().for_each(|action| self.act(action));
         }
         if self.shell.log.added() != self.log_seen {
             let new = (self.shell.log.added() - self.log_seen) as usize;
@@ -172,6 +176,7 @@ impl Game {
             return;
         };
         self.loading = None;
+        self.shell.release();
         match outcome {
             Ok(mut level) => {
                 self.end_recording();
@@ -183,7 +188,12 @@ impl Game {
                 {
                     (level.camera, level.time) = (resume.camera, resume.time);
                 }
-                self.shell.log.say(format!("{map} loaded in {seconds:.2} s"));
+                let times = level
+                    .loading_times
+                    .map(|(what, time)| format!("{what} {:.2}", time.as_secs_f32()));
+                self.shell
+                    .log
+                    .say(format!("{map} loaded in {seconds:.2} s ({})", times.join(", ")));
                 self.window.set_title(&format!("q3rays - {map}"));
                 self.idle();
                 self.level = Some(level);

@@ -24,6 +24,7 @@ use crate::scene::clusters::{LightRows, cluster_at};
 use crate::scene::entity_geometry::EntityState;
 use crate::scene::records::BspNode;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Share of the way to the wanted exposure per second.
 const EXPOSURE_RATE: f32 = 2.0;
@@ -36,6 +37,8 @@ pub struct Level {
     pub camera: Camera,
     /// What was missing or damaged.
     pub warnings: Vec<String>,
+    /// What its loading took.
+    pub loading_times: [(&'static str, Duration); 3],
     nodes: Vec<BspNode>,
     rows: LightRows,
     /// Time of the scene, seconds.
@@ -96,6 +99,7 @@ impl Level {
             play,
             camera,
             warnings: scene.warnings.clone(),
+            loading_times: Default::default(),
             nodes: scene.bsp_nodes.clone(),
             rows: scene.rows.clone(),
             time: 0.0,

@@ -42,6 +42,8 @@ pub struct Start {
     pub resume: Option<Resume>,
     /// When the device was lost last.
     pub lost: Option<Instant>,
+    /// Console commands for the map once it is there.
+    pub commands: String,
 }
 
 /// Frame times being written down, and where they go.
@@ -111,6 +113,7 @@ impl Game {
             stats,
             resume,
             lost,
+            commands,
         } = start;
         let applied = Applied {
             fullscreen: false,
@@ -183,7 +186,11 @@ impl Game {
             shaders: super::shader_watch::ShaderWatch::new(),
             window,
         };
+        // Scripts of the user's own come first, the command line's commands once the map is there.
+        game.run_console();
         game.load(&map);
+        game.shell.push(&commands);
+        game.shell.hold();
         Ok(game)
     }
 
@@ -213,16 +220,20 @@ impl Game {
             frames: self.frames_left,
             stats: self.whole_run.take(),
             lost: self.lost,
+            commands: String::new(),
             resume,
             shell: std::mem::take(&mut self.shell),
             config: self.config,
         };
         let window = self.window.clone();
-        let (applied, focused) = (self.applied, self.focused);
+        let (applied, focused, log_seen) = (self.applied, self.focused, self.log_seen);
         // A window has one device at a time.
         drop((level, self.films, self.screen));
+        let mut start = start;
+        start.shell.hold();
         let mut game = Self::new(window, start)?;
         (game.applied, game.focused) = (applied, focused);
+        game.log_seen = log_seen;
         Ok(game)
     }
 

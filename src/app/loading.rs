@@ -124,12 +124,25 @@ impl Job {
     }
 
     fn run(self) -> Result<Level, String> {
+        let begin = Instant::now();
         self.say(SCENE.0, SCENE.1);
         let report = |doing: &str, share: f32| self.say(doing, SCENE.1 + (UPLOAD.1 - SCENE.1) * share);
         let scene = (self.source.load)(&self.map, &self.cvars, &report)?;
+        let read = begin.elapsed();
         self.say(UPLOAD.0, UPLOAD.1);
-        let say = || self.say(PIPELINES.0, PIPELINES.1);
+        let uploaded = std::cell::Cell::new(Duration::ZERO);
+        let say = || {
+            uploaded.set(begin.elapsed());
+            self.say(PIPELINES.0, PIPELINES.1);
+        };
         let fov = self.cvars.number("cg_fov") as f32;
-        Level::new(&scene, &self.device, self.backend, &self.cache, self.size, fov, &say).map_err(|e| e.to_string())
+        let made = Level::new(&scene, &self.device, self.backend, &self.cache, self.size, fov, &say);
+        let mut level = made.map_err(|e| e.to_string())?;
+        level.loading_times = [
+            ("map and lights", read),
+            ("trees and upload", uploaded.get() - read),
+            ("shaders", begin.elapsed() - uploaded.get()),
+        ];
+        Ok(level)
     }
 }

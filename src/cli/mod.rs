@@ -9,6 +9,7 @@ mod light_list;
 mod lights;
 mod maps;
 mod merge;
+mod path;
 mod play;
 mod render;
 

@@ -80,14 +80,13 @@ fn in_window(common: &Common, map: &str, args: &Args, words: &ConsoleWords) -> C
     if folders.config.join(AUTOEXEC).is_file() {
         shell.push(&format!("exec {AUTOEXEC}"));
     }
-    for words in words
+    let is_map = |words: &[String]| matches!(words[0].as_str(), "map" | "devmap");
+    let commands: Vec<String> = words
         .commands
         .iter()
-        .filter(|w| !matches!(w[0].as_str(), "map" | "devmap"))
-    {
-        let words: Vec<String> = words.iter().map(|w| quoted(w)).collect();
-        shell.push(&words.join(" "));
-    }
+        .filter(|words| !is_map(words))
+        .map(|words| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" "))
+        .collect();
     let load = {
         let (common, files) = (common.clone(), files.clone());
         move |map: &str, cvars: &Cvars, report: &(dyn Fn(&str, f32) + Sync)| {
@@ -113,5 +112,6 @@ fn in_window(common: &Common, map: &str, args: &Args, words: &ConsoleWords) -> C
         stats: args.stats.clone().map(StatsRun::new),
         resume: None,
         lost: None,
+        commands: commands.join("\n"),
     })
 }

@@ -22,7 +22,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct Args {
     /// Map name
-    map: String,
+    pub map: String,
     /// Eye and angles: X,Y,Z,PITCH,YAW[,ROLL] (units, degrees)
     #[arg(
         long,
@@ -42,10 +42,10 @@ pub struct Args {
     fov: Option<String>,
     /// Image size
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
-    size: (u32, u32),
+    pub size: (u32, u32),
     /// Average N independent samples per pixel (default 32)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    spp: Option<u32>,
+    pub spp: Option<u32>,
     /// Number of the first sample, for runs that are merged later
     #[arg(long, value_name = "K", default_value_t = 0)]
     first_sample: u32,
@@ -57,16 +57,20 @@ pub struct Args {
     time: Option<f64>,
     /// Frames per second of the scene clock; without it the clock stands still
     #[arg(long, value_name = "F", value_parser = parse_rate)]
-    fps: Option<f64>,
+    pub fps: Option<f64>,
     /// Write times per frame: .json or .csv
     #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
+    pub stats: Option<PathBuf>,
     /// Image to write: .png or .exr
     #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// Folder for the intermediate images as EXR
     #[arg(long, value_name = "DIR")]
     aov: Option<PathBuf>,
+    /// Render a recording: each of its frames, or fixed steps of time with --fps; --out F.png or F.exr numbers the frames, F.mp4 and the
+    /// like need ffmpeg
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "camera_to", "spawn", "frames", "time", "aov", "first_sample"])]
+    path: Option<PathBuf>,
 }
 
 /// Largest image edge, pixels: what random-number addresses and GPUs hold.
@@ -181,6 +185,11 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         let note = cvars.set("cg_fov", fov).map_err(|e| CliError::Usage(e.to_string()))?;
         note.into_iter().for_each(|n| eprintln!("{n}"));
     }
+    // An output that cannot be written is told before the work is done, not after it.
+    if let Some(path) = args.path.clone() {
+        atomic::create_parent(&args.out).map_err(CliError::failed)?;
+        return super::path::run(common, &cvars, &args, &path);
+    }
     let known = args
         .out
         .extension()
@@ -188,7 +197,6 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     if !known {
         return Err(CliError::Usage(OutputError::Extension { path: args.out }.to_string()));
     }
-    // An output that cannot be written is told before the work is done, not after it.
     atomic::create_parent(&args.out).map_err(CliError::failed)?;
     let (scene, _) = common.lit_scene(&args.map, &cvars)?;
     let settings = Settings {

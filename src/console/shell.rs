@@ -82,8 +82,12 @@ pub struct Shell {
     pub log: Log,
     pub names: Names,
     queue: VecDeque<Vec<String>>,
+    /// Commands that wait for a map.
+    held: VecDeque<Vec<String>>,
     /// Frames until the next command.
     waiting: u32,
+    /// Commands that may still run in this frame.
+    left: usize,
 }
 
 impl Shell {
@@ -93,26 +97,47 @@ impl Shell {
         self.queue.truncate(MOST_COMMANDS);
     }
 
-    /// Runs what there is, up to the next `wait`; called once a frame.
-    pub fn run(&mut self, scripts: &dyn Scripts) -> Vec<Action> {
-        let mut actions = Vec::new();
-        for _ in 0..MOST_AT_ONCE {
-            if self.waiting > 0 {
-                self.waiting -= 1;
-                return actions;
-            }
-            let Some(words) = self.queue.pop_front() else {
-                return actions;
-            };
-            self.command(&words, scripts, &mut actions);
+    /// What is still to run waits until [`Self::release`]: what stands behind `map` in a script is meant for that map. What is typed
+    /// meanwhile runs at once.
+    pub fn hold(&mut self) {
+        self.held.append(&mut self.queue);
+        self.waiting = 0;
+    }
+
+    /// What was held runs now.
+    pub fn release(&mut self) {
+        self.held.append(&mut self.queue);
+        std::mem::swap(&mut self.held, &mut self.queue);
+    }
+
+    /// A frame begins: waits are a frame shorter, and as many commands may run as in any.
+    pub fn begin_frame(&mut self) {
+        self.waiting = self.waiting.saturating_sub(1);
+        self.left = MOST_AT_ONCE;
+    }
+
+    /// Runs the next command and returns what it asks for; `None` where there is none, or it is to wait.
+    pub fn step(&mut self, scripts: &dyn Scripts) -> Option<Vec<Action>> {
+        if self.waiting > 0 {
+            return None;
         }
-        if !self.queue.is_empty() {
+        if self.left == 0 && !self.queue.is_empty() {
             self.queue.clear();
             self.log.warn(format!(
                 "more than {MOST_AT_ONCE} commands at once: the rest is dropped"
             ));
         }
-        actions
+        let words = self.queue.pop_front()?;
+        self.left = self.left.saturating_sub(1);
+        let mut actions = Vec::new();
+        self.command(&words, scripts, &mut actions);
+        Some(actions)
+    }
+
+    /// Runs a frame's commands, up to the next `wait`.
+    pub fn run(&mut self, scripts: &dyn Scripts) -> Vec<Action> {
+        self.begin_frame();
+        std::iter::from_fn(|| self.step(scripts)).flatten().collect()
     }
 
     /// Runs a text at once and returns what it asks for.
@@ -123,7 +148,7 @@ impl Shell {
 
     /// Whether commands are still to run.
     pub fn is_busy(&self) -> bool {
-        !self.queue.is_empty() || self.waiting > 0
+        !self.queue.is_empty() || !self.held.is_empty() || self.waiting > 0
     }
 
     fn command(&mut self, words: &[String], scripts: &dyn Scripts, actions: &mut Vec<Action>) {
@@ -211,7 +236,7 @@ impl Shell {
             }
             "wait" => {
                 let frames = first.as_deref().map_or(Ok(1), str::parse::<u32>).map_err(|_| usage())?;
-                self.waiting += frames.min(1_000_000);
+                self.waiting = frames.min(1_000_000);
             }
             "echo" => self.log.say(arguments.join(" ")),
             "clear" => self.log.clear(),

@@ -29,6 +29,7 @@ use crate::scene::guests::guests;
 use crate::scene::polygons::Polygon;
 use crate::scene::records::Light;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// In frames that are shown as they come, a branch of less than this share of what the eye sees is followed in proportion to
 /// it.
@@ -109,24 +110,45 @@ impl FrameRenderer {
             layouts: [&scene.layout, &view_layout],
             cache,
         };
-        Ok(Self {
-            deform: Deform::new(&context)?,
-            primary: Primary::new(&context)?,
-            focus: Focus::new(&context)?,
-            direct: Direct::new(&context)?,
-            secondary: Secondary::new(&context)?,
-            resample: Resample::new(&context)?,
-            reuse: Reuse::new(&context)?,
-            gradient: Gradient::new(&context)?,
-            gradient_atrous: GradientAtrous::new(&context)?,
-            temporal: Temporal::new(&context)?,
-            atrous: Atrous::new(&context)?,
-            composite: Composite::new(&context)?,
-            taa: Taa::new(&context)?,
-            exposure: Exposure::new(&context)?,
-            tone_map: ToneMap::new(&context)?,
-            view_layout: view_layout.clone(),
-        })
+        let begin = Instant::now();
+        // Drivers take their time for large shaders, and take it on as many threads as ask.
+        let made = std::thread::scope(|scope| {
+            let deform = scope.spawn(|| Deform::new(&context));
+            let primary = scope.spawn(|| Primary::new(&context));
+            let focus = scope.spawn(|| Focus::new(&context));
+            let direct = scope.spawn(|| Direct::new(&context));
+            let secondary = scope.spawn(|| Secondary::new(&context));
+            let resample = scope.spawn(|| Resample::new(&context));
+            let reuse = scope.spawn(|| Reuse::new(&context));
+            let gradient = scope.spawn(|| Gradient::new(&context));
+            let gradient_atrous = scope.spawn(|| GradientAtrous::new(&context));
+            let temporal = scope.spawn(|| Temporal::new(&context));
+            let atrous = scope.spawn(|| Atrous::new(&context));
+            let composite = scope.spawn(|| Composite::new(&context));
+            let taa = scope.spawn(|| Taa::new(&context));
+            let exposure = scope.spawn(|| Exposure::new(&context));
+            let tone_map = scope.spawn(|| ToneMap::new(&context));
+            Ok(Self {
+                deform: joined(deform)?,
+                primary: joined(primary)?,
+                focus: joined(focus)?,
+                direct: joined(direct)?,
+                secondary: joined(secondary)?,
+                resample: joined(resample)?,
+                reuse: joined(reuse)?,
+                gradient: joined(gradient)?,
+                gradient_atrous: joined(gradient_atrous)?,
+                temporal: joined(temporal)?,
+                atrous: joined(atrous)?,
+                composite: joined(composite)?,
+                taa: joined(taa)?,
+                exposure: joined(exposure)?,
+                tone_map: joined(tone_map)?,
+                view_layout: view_layout.clone(),
+            })
+        });
+        tracing::info!("pipelines in {:.2} s", begin.elapsed().as_secs_f64());
+        made
     }
 
     /// Records one frame of a view. `slot` names the frame in flight whose constants and counters may be written.
@@ -248,6 +270,14 @@ impl FrameRenderer {
             self.tone_map.record(&mut r, &view.exposure)?;
         }
         Ok(())
+    }
+}
+
+/// What a thread has made.
+fn joined<T>(thread: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    match thread.join() {
+        Ok(made) => made,
+        Err(panic) => std::panic::resume_unwind(panic),
     }
 }
 

@@ -124,6 +124,15 @@ impl Realtime {
     }
 }
 
+impl Drop for Realtime {
+    fn drop(&mut self) {
+        // Passes and images go before the ring, which would wait too late.
+        if let Err(error) = self.ring.wait() {
+            tracing::debug!("{error}");
+        }
+    }
+}
+
 /// A recorded frame on its way to where it is shown.
 pub struct Shown<'a, 'b> {
     pub frame: Frame<'a>,

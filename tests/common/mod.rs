@@ -4,6 +4,7 @@
 #![allow(dead_code)]
 
 pub mod analytic;
+pub mod desk;
 pub mod leaks;
 pub mod small_views;
 pub mod ties;
