@@ -10,7 +10,8 @@ use q3rays::assets::entities::{Entity, parse};
 use q3rays::assets::vfs::FileSource;
 use q3rays::assets::vfs::search_path::map_path;
 use q3rays::game::collision::{CollisionWorld, Extent, PLAYER_SOLID};
-use q3rays::game::movement::{Command, STEP, extent};
+use q3rays::game::movement::{Command, Mode, STEP, extent};
+use q3rays::game::movers::Kind;
 use q3rays::game::play::{Event, Play};
 use q3rays::scene::clock::Clock;
 use q3rays::scene::sampling::{key, unit};
@@ -267,4 +268,131 @@ fn items_are_taken_and_come_back() {
         );
     }
     assert!(!hidden(&play));
+}
+
+/// Steps through some seconds; `each` is called after every step.
+fn pass(play: &mut Play, begin: f64, seconds: f32, command: &Command, mut each: impl FnMut(&mut Play, &[Event])) {
+    for i in 0..(seconds / STEP) as u32 {
+        let mut events = Vec::new();
+        let clock = Clock::from_seconds(begin + f64::from(i) * f64::from(STEP));
+        play.step(clock, command, &mut events);
+        each(play, &events);
+    }
+}
+
+/// Platforms wait at the bottom, carry up who steps on, stay up under them, and go down again.
+#[test]
+fn platforms_carry_and_come_back() {
+    let mut found = 0;
+    for name in ["czest2ctf", "sleekgrinder"] {
+        let mut play = play(name);
+        let platforms: Vec<usize> = (0..play.movers.len())
+            .filter(|i| play.movers[*i].kind == Kind::Platform && play.movers[*i].field.is_some())
+            .collect();
+        for i in platforms {
+            let platform = play.movers[i].clone();
+            let bounds = play.collision.bounds(platform.model).unwrap();
+            let top = Vec3::new(
+                bounds.centre().x,
+                bounds.centre().y,
+                bounds.max.z + platform.rest.z + 24.5,
+            );
+            play.respawn();
+            (play.body.origin, play.body.velocity) = (top, Vec3::ZERO);
+            let way = platform.way.z.abs();
+            let mut most = 0f32;
+            pass(&mut play, 0.0, 4.0, &Command::default(), |play, _| {
+                most = most.max(play.body.origin.z - top.z);
+            });
+            assert!((most - way).abs() < 2.0, "{name}: carried {most} of {way}");
+            assert!(
+                (play.movers[i].offset().z.abs() - way).abs() < 0.1,
+                "it stays up under somebody"
+            );
+            play.respawn();
+            play.body.mode = Mode::NoClip;
+            pass(&mut play, 4.0, 8.0, &Command::default(), |_, _| {});
+            assert_eq!(play.movers[i].offset(), Vec3::ZERO, "{name}: it goes down again");
+            play.body.mode = Mode::Walk;
+            found += 1;
+        }
+    }
+    assert!(found >= 2, "{found} platforms");
+}
+
+/// Buttons set off what they name, and teams move as one.
+#[test]
+fn buttons_and_teams_work() {
+    let (mut buttons, mut teams) = (0, 0);
+    for name in ["ce1m7", "oa_bases3plus3", "oa_koth2", "kaos", "pul1duel-oa"] {
+        let first = play(name);
+        for i in 0..first.movers.len() {
+            let mover = first.movers[i].clone();
+            let Some(field) = mover.field else { continue };
+            let mut play = play(name);
+            play.body.origin = field.centre();
+            let mut moved = Vec::new();
+            let mut events = Vec::new();
+            play.step(Clock::default(), &Command::default(), &mut events);
+            moved.extend(events.iter().filter_map(|e| match e {
+                Event::Moved { entity } => Some(*entity),
+                _ => None,
+            }));
+            assert!(
+                moved.contains(&mover.entity),
+                "{name}: {mover:?} is not set off by who is there"
+            );
+            if mover.kind == Kind::Button && mover.target.is_some() {
+                let named: Vec<_> = first
+                    .movers
+                    .iter()
+                    .filter(|m| m.name == mover.target)
+                    .map(|m| m.entity)
+                    .collect();
+                assert!(
+                    named.iter().all(|e| moved.contains(e)),
+                    "{name}: {named:?} of {moved:?}"
+                );
+                buttons += usize::from(!named.is_empty());
+            }
+            for other in first
+                .movers
+                .iter()
+                .filter(|m| m.entity != mover.entity && m.is_team(&mover))
+            {
+                assert!(
+                    moved.contains(&other.entity),
+                    "{name}: the team of {} stays",
+                    mover.entity
+                );
+                teams += 1;
+            }
+        }
+    }
+    assert!(buttons + teams >= 4, "{buttons} buttons, {teams} in teams");
+}
+
+/// A door turns back from somebody in its way; one that crushes does not.
+#[test]
+fn doors_turn_back_and_crushers_do_not() {
+    for crusher in [false, true] {
+        let mut play = play("showcase");
+        play.movers[0].crusher = crusher;
+        let door = play.movers[0].clone();
+        let under = play.collision.bounds(door.model).unwrap().centre();
+        play.body.origin = Vec3::new(under.x + 100.0, under.y, 24.2);
+        pass(&mut play, 0.0, 1.5, &Command::default(), |_, _| {});
+        assert!(play.movers[0].offset().z > 0.9 * door.way.z, "open");
+        // Nobody keeps it open, and somebody is under it when it comes down.
+        play.movers[0].field = None;
+        play.body.origin = Vec3::new(under.x, under.y, 24.2);
+        let mut died = false;
+        let mut lowest = f32::MAX;
+        pass(&mut play, 1.5, 4.0, &Command::default(), |play, events| {
+            died |= events.contains(&Event::Died);
+            lowest = lowest.min(play.movers[0].offset().z);
+        });
+        assert_eq!(died, crusher);
+        assert_eq!(lowest <= 0.0, crusher, "{lowest}");
+    }
 }

@@ -22,6 +22,7 @@ pub fn show(ctx: &egui::Context, facts: &Facts<'_>) {
             over_picture().show(ui, |ui| {
                 ui.set_width(WIDTH);
                 ui.spacing_mut().item_spacing.y = 1.0;
+                ui.spacing_mut().interact_size.y = 0.0;
                 contents(ui, facts);
             });
         });

@@ -12,6 +12,9 @@ use egui::{ComboBox, DragValue, RichText, ScrollArea, Slider, vec2};
 /// Largest whole number that gets a slider; larger ranges are dragged.
 const SLIDER_RANGE: i64 = 128;
 
+/// Width of the window, points.
+const WIDTH: f32 = 440.0;
+
 /// Parts of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Tab {
@@ -83,8 +86,9 @@ impl SettingsPanel {
         let screen = ctx.content_rect();
         egui::Window::new("Settings")
             .open(open)
-            .default_pos(screen.min + vec2(24.0, 24.0))
-            .default_size(vec2(440.0, screen.height() * 0.75))
+            // The times are on the other side.
+            .default_pos(screen.right_top() + vec2(-24.0 - WIDTH, 24.0))
+            .default_size(vec2(WIDTH, screen.height() * 0.75))
             .show(ctx, |ui| {
                 ui.horizontal(|ui| {
                     for (tab, name) in [
