@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 /// Lines kept for scrolling back.
-pub const MOST_LINES: usize = 4096;
+pub const MOST_LINES: usize = 1024;
 
 /// Lines of the console, oldest first.
 #[derive(Clone, Debug, Default)]

@@ -15,6 +15,9 @@ const VERSION: u32 = 1;
 /// Most frames of a recording: a day at 60 a second would not fit into memory.
 pub const MOST_FRAMES: usize = 2_000_000;
 
+/// Frames from one that names all entities that are not as the map has them to the next that does.
+const KEY_FRAME: usize = 256;
+
 /// Why a recording cannot be used.
 #[derive(Debug, Error)]
 pub enum RecordingError {
@@ -39,7 +42,7 @@ pub struct RecordedFrame {
     pub command: Command,
     /// The view at the frame's end, in the units and angles of [`Camera`].
     pub camera: Camera,
-    /// Entities that are not as the map has them, where they differ from the frame before.
+    /// Entities that are not as the map has them, where they differ from the frame before, and from time to time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub entities: Option<Vec<EntityState>>,
     /// The state that the frame began with, where that does not follow from the frame before: at the start, and after commands such as
@@ -88,7 +91,8 @@ impl Recording {
             .rev()
             .find_map(|f| f.entities.as_deref())
             .unwrap_or_default();
-        if known != entities {
+        // Again from time to time, so that nobody has to look far for them.
+        if known != entities || self.frames.len().is_multiple_of(KEY_FRAME) {
             frame.entities = Some(entities.to_vec());
         }
         self.frames.push(frame);
@@ -234,7 +238,7 @@ mod tests {
             let states = if i < 100 { &[][..] } else { &[state][..] };
             assert!(recording.push(frame(at, (at as f32).sin() * 1e4, (at as f32).cos() * 180.0), states));
         }
-        assert_eq!(recording.frames.iter().filter(|f| f.entities.is_some()).count(), 1);
+        assert_eq!(recording.frames.iter().filter(|f| f.entities.is_some()).count(), 2);
         assert!(recording.write(&path).is_ok());
         assert_eq!(Recording::read(&path).ok(), Some(recording));
         std::fs::write(&path, b"{\"version\": 1").expect("written");

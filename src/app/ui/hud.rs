@@ -36,7 +36,11 @@ pub fn show(ctx: &egui::Context, facts: &Facts<'_>, shell: &Shell, hints_until: 
         loading(ctx, map, &progress.doing, progress.share, *seconds);
     }
     if let Some(notice) = facts.notice {
-        corner_off(ctx, "notice", Align2::CENTER_BOTTOM, 44.0, |ui| line(ui, notice));
+        let most = ctx.content_rect().width() * 0.7;
+        corner_off(ctx, "notice", Align2::CENTER_BOTTOM, 44.0, |ui| {
+            ui.set_max_width(most);
+            ui.label(RichText::new(notice).monospace().color(TEXT));
+        });
     }
     if ctx.input(|i| i.time) < hints_until && !covered {
         corner(ctx, "hints", Align2::CENTER_BOTTOM, |ui| hints(ui, shell));
