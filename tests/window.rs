@@ -172,21 +172,32 @@ fn somebody_plays() {
         "the picture tells how it was made"
     );
 
-    // What somebody finds who has read nothing: the menu on Escape, and from there maps and settings.
-    desk.key(&["Escape"]);
-    std::thread::sleep(Duration::from_millis(700));
-    let menu = desk.picture("10_menu");
-    assert!(difference(&menu, &map, [300, 150, 500, 300]) > 0.3);
-    desk.key(&["Escape", "F3"]);
+    // What somebody finds who has read nothing: the menu on Escape, and from there maps and settings. Each panel covers its place and
+    // nothing else.
+    desk.console(&["rt_pause 1; echo paused"], "paused\n");
+    std::thread::sleep(Duration::from_secs(6));
+    let plain = desk.picture("10_plain");
+    let corner = [580, 385, 790, 440];
+    let panel = |keys: &[&str], name: &str, place: [u32; 4]| {
+        desk.key(keys);
+        std::thread::sleep(Duration::from_millis(1500));
+        let shown = desk.picture(name);
+        let (there, beside) = (difference(&shown, &plain, place), difference(&shown, &plain, corner));
+        assert!(there > 0.4, "{name}: {there} of its place has changed");
+        assert!(beside < 0.1, "{name}: {beside} of the corner has changed");
+    };
+    panel(&["Escape"], "11_menu", [290, 140, 510, 280]);
+    panel(&["Escape", "F2"], "12_settings", [400, 60, 760, 250]);
+    panel(&["Escape", "F4"], "13_times", [12, 12, 330, 100]);
+    desk.key(&["F4", "F3"]);
     std::thread::sleep(Duration::from_secs(2));
-    desk.picture("11_maps");
-    desk.key(&["Escape", "F2"]);
-    std::thread::sleep(Duration::from_secs(1));
-    desk.picture("12_settings");
-    desk.key(&["Escape", "F4"]);
-    std::thread::sleep(Duration::from_secs(1));
-    let times = desk.picture("13_times");
-    assert!(difference(&times, &map, [10, 10, 300, 60]) > 0.05);
+    let maps = desk.picture("14_maps");
+    assert!(difference(&maps, &plain, [120, 90, 680, 330]) > 0.6);
+    desk.key(&["Escape"]);
+    std::thread::sleep(Duration::from_millis(1500));
+    let closed = desk.picture("15_closed");
+    assert!(difference(&closed, &plain, [120, 90, 680, 330]) < 0.1);
+    desk.console(&["rt_pause 0; echo on"], "on\n");
 
     // The way that was recorded, shown again.
     desk.console(&["timedemo way"], "frames, median");

@@ -1,8 +1,8 @@
 //! What console commands do to the program.
 
 use super::capture;
-use super::film::{FilmJob, film_path};
-use super::game::{FilmNews, Game};
+use super::film::{FilmJob, film_extension};
+use super::game::{FilmNews, FilmWork, Game};
 use super::headless::run_stats;
 use super::journey::{Playback, Recorder};
 use super::lifecycle::StatsRun;
@@ -55,7 +55,7 @@ impl Game {
                 (level.camera.yaw, level.camera.pitch) = (yaw.rem_euclid(360.0), pitch.clamp(-89.0, 89.0));
                 None
             }),
-            Action::ViewPos => Ok(self.shown.map(|c| {
+            Action::ViewPos => Ok(self.shown.map(|(c, _)| {
                 let [x, y, z] = c.eye;
                 format!("{x:.2} {y:.2} {z:.2} {:.2} {:.2}", c.yaw, c.pitch)
             })),
@@ -121,11 +121,11 @@ impl Game {
     fn screenshot(&mut self, name: Option<&str>, radiance: bool) -> Result<Option<String>, String> {
         let extension = if radiance { "exr" } else { "png" };
         let engine = self.screen.engine();
-        let (Some(level), Some(camera)) = (&mut self.level, self.shown) else {
+        let (Some(level), Some((camera, clock))) = (&mut self.level, self.shown) else {
             return Err("there is nothing to see yet".to_owned());
         };
         let path = self.folders.named_or_new("screenshots", name, &level.map, extension)?;
-        capture::screenshot(level, &camera, &engine, &self.shell.cvars, &path, radiance)?;
+        capture::screenshot(level, (&camera, clock), &engine, &self.shell.cvars, &path, radiance)?;
         Ok(Some(format!("wrote {}", path.display())))
     }
 
@@ -182,6 +182,11 @@ impl Game {
             self.playback = None;
             return;
         }
+        self.shown = None;
+        if playback.timed {
+            // What a script says next is for when it has ended.
+            self.shell.hold();
+        }
         // The same frames come out each time, and their times are theirs alone.
         let forgotten = level.realtime.finish().and_then(|_| level.forget());
         if let Err(e) = forgotten {
@@ -198,6 +203,8 @@ impl Game {
         if self.playback.is_none() {
             return Ok(());
         }
+        self.shell.release();
+        self.shown = None;
         if let Some(level) = &mut self.level {
             let rest = level.realtime.finish()?;
             level.forget()?;
@@ -274,7 +281,11 @@ impl Game {
         let recording = Recording::read(&self.folders.recording(name)?).map_err(|e| e.to_string())?;
         let level = self.level.as_ref().filter(|l| l.map == recording.map);
         let level = level.ok_or_else(|| format!("it was recorded on another map: `map {}` first", recording.map))?;
-        let out = film_path(&self.folders.file("films", name, "film")?.with_extension(""));
+        if self.films.iter().any(|film| film.name == name) {
+            return Err(format!("a film of {name} is being made"));
+        }
+        let out = self.folders.file("films", name, film_extension())?;
+        let cache = Some(self.screen.cache.clone());
         let scene = level.realtime.scene.clone();
         let settings = settings(&self.shell.cvars);
         let size = level.realtime.view.gbuffer.size;
@@ -286,6 +297,7 @@ impl Game {
                 settings,
                 size,
                 fps: Some(fps),
+                cache,
                 samples,
                 out,
             };
@@ -293,8 +305,12 @@ impl Game {
             let made = job.run(&|share| sender.send(FilmNews::Share(share)).is_ok());
             let _ = sender.send(FilmNews::Done(made.map(|(said, _)| said)));
         });
-        worker.map_err(|e| format!("cannot begin to make a film ({e})"))?;
-        self.films.push((format!("film {name}: 0%"), receiver));
+        self.films.push(FilmWork {
+            name: name.to_owned(),
+            note: format!("film {name}: 0%"),
+            news: receiver,
+            worker: worker.map_err(|e| format!("cannot begin to make a film ({e})"))?,
+        });
         Ok(Some(format!(
             "making a film of {name} at {fps} frames a second, {samples} samples each"
         )))
@@ -303,13 +319,12 @@ impl Game {
     /// Hears how far films have come.
     pub(super) fn follow_films(&mut self) {
         let mut said = Vec::new();
-        self.films.retain_mut(|(note, news)| {
+        self.films.retain_mut(|FilmWork { name, note, news, .. }| {
             let mut goes_on = true;
             loop {
                 match news.try_recv() {
                     Ok(FilmNews::Share(share)) => {
-                        let name = note.split(':').next().unwrap_or_default().to_owned();
-                        *note = format!("{name}: {:.0}%", share * 100.0);
+                        *note = format!("film {name}: {:.0}%", share * 100.0);
                     }
                     Ok(FilmNews::Done(done)) => {
                         said.push(done);

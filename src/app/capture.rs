@@ -8,6 +8,7 @@ use crate::output::{atomic, exr_file, png_file};
 use crate::render::gpu_renderer::{film, shown_film};
 use crate::render::view_state::ViewState;
 use crate::scene::camera::Camera;
+use crate::scene::clock::Clock;
 use std::path::Path;
 
 /// The display image as it is shown, row by row from the top. The GPU must be done with it.
@@ -20,7 +21,12 @@ pub fn display_pixels(view: &ViewState) -> Result<Vec<[u8; 3]>, String> {
 }
 
 /// Where and how a picture was taken, as text chunks of a PNG or attributes of an EXR.
-fn texts(level: &Level, camera: &Camera, engine: &Engine, cvars: &Cvars) -> Vec<(&'static str, String)> {
+fn texts(
+    level: &Level,
+    (camera, clock): (&Camera, Clock),
+    engine: &Engine,
+    cvars: &Cvars,
+) -> Vec<(&'static str, String)> {
     let mut run = RunStats {
         device: String::new(),
         backend: String::new(),
@@ -43,7 +49,7 @@ fn texts(level: &Level, camera: &Camera, engine: &Engine, cvars: &Cvars) -> Vec<
                 c.eye[0], c.eye[1], c.eye[2], c.pitch, c.yaw, c.roll
             ),
         ),
-        ("time", level.time.to_string()),
+        ("time", clock.seconds().to_string()),
         ("samples", level.accumulated.max(1).to_string()),
         ("device", format!("{} ({}), {}", run.device, run.driver, run.backend)),
         ("settings", serde_json::Value::Object(run.settings).to_string()),
@@ -56,7 +62,7 @@ fn texts(level: &Level, camera: &Camera, engine: &Engine, cvars: &Cvars) -> Vec<
 /// One sentence of the device's or the file system's.
 pub fn screenshot(
     level: &mut Level,
-    camera: &Camera,
+    view: (&Camera, Clock),
     engine: &Engine,
     cvars: &Cvars,
     path: &Path,
@@ -65,7 +71,7 @@ pub fn screenshot(
     let failed = |e: &dyn std::fmt::Display| e.to_string();
     level.realtime.finish().map_err(|e| failed(&e))?;
     atomic::create_parent(path).map_err(|e| failed(&e))?;
-    let texts = texts(level, camera, engine, cvars);
+    let texts = texts(level, view, engine, cvars);
     let view = &level.realtime.view;
     if radiance {
         let film = match level.accumulated {

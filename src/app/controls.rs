@@ -86,7 +86,14 @@ impl Game {
         }
         // A held key repeats: it is down already.
         match keys::name(code) {
-            Some(_) if event.repeat => !self.ui.wants_pointer(),
+            Some(name) if event.repeat => {
+                let panel = self
+                    .shell
+                    .binds
+                    .get(name)
+                    .is_some_and(|command| opens_panels(name, command));
+                panel || !self.ui.wants_pointer()
+            }
             Some(name) => self.press(name, down, true),
             None => false,
         }

@@ -1,8 +1,9 @@
 //! Films of recordings: frames at fixed steps of time, each as fine as is wanted, as numbered pictures or through ffmpeg.
 
 use super::capture::display_pixels;
+use crate::console::settings::FRAME_RATE;
 use crate::game::recording::{RecordedView, Recording};
-use crate::gpu::SubmitSync;
+use crate::gpu::{PipelineCache, SubmitSync};
 use crate::output::stats::FrameStats;
 use crate::output::{atomic, exr_file, png_file};
 use crate::render::frame::FrameInput;
@@ -12,7 +13,7 @@ use crate::render::scene_gpu::SceneGpu;
 use crate::render::settings::Settings;
 use crate::scene::camera::Camera;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
@@ -29,6 +30,7 @@ pub struct FilmJob<'a> {
     pub size: (u32, u32),
     /// Frames a second; `None` shows each recorded frame once.
     pub fps: Option<f64>,
+    pub cache: Option<Arc<PipelineCache>>,
     /// Samples that each frame averages; 1 shows frames as they come, denoised.
     pub samples: u32,
     /// `.mp4` and the like by ffmpeg; `.png` or `.exr`: a number is put before the extension.
@@ -38,7 +40,22 @@ pub struct FilmJob<'a> {
 /// Where the frames go.
 enum Sink {
     Pictures,
-    Ffmpeg(Child),
+    Ffmpeg(Ffmpeg),
+}
+
+/// ffmpeg at work, and the file that it complains to: a pipe that nobody reads would stop it.
+struct Ffmpeg {
+    child: Child,
+    said: PathBuf,
+}
+
+impl Drop for Ffmpeg {
+    fn drop(&mut self) {
+        // It ends when its input does; without frames there is nothing that it could still spoil.
+        drop(self.child.stdin.take());
+        let _ = self.child.wait();
+        let _ = std::fs::remove_file(&self.said);
+    }
 }
 
 /// Whether ffmpeg can be run.
@@ -85,6 +102,8 @@ impl FilmJob<'_> {
             return Ok(Sink::Pictures);
         }
         let (width, height) = self.size;
+        let said = self.out.with_extension(format!("ffmpeg{}", std::process::id()));
+        let complaints = std::fs::File::create(&said).map_err(|e| format!("cannot write {} ({e})", said.display()))?;
         let child = Command::new("ffmpeg")
             .args(["-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
             .args([
@@ -104,9 +123,9 @@ impl FilmJob<'_> {
             .arg(&self.out)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
-            .stderr(Stdio::piped())
+            .stderr(complaints)
             .spawn();
-        child.map(Sink::Ffmpeg).map_err(|e| {
+        child.map(|child| Sink::Ffmpeg(Ffmpeg { child, said })).map_err(|e| {
             format!(
                 "films such as {} need ffmpeg ({e}); a name that ends in .png makes numbered pictures",
                 self.out.display()
@@ -124,7 +143,8 @@ impl FilmJob<'_> {
             return Err("the recording has no frames".to_owned());
         }
         let mut sink = self.sink()?;
-        let mut realtime = Realtime::new(self.scene.clone(), self.size, None).map_err(|e| e.to_string())?;
+        let mut realtime =
+            Realtime::new(self.scene.clone(), self.size, self.cache.as_deref()).map_err(|e| e.to_string())?;
         let mut stats = Vec::new();
         let mut sample = 0;
         let mut written = 0;
@@ -149,7 +169,8 @@ impl FilmJob<'_> {
         stats: &mut Vec<FrameStats>,
     ) -> Result<(), String> {
         let averaged = self.samples > 1;
-        let shutter = f64::from(self.settings.shutter) * self.fps.unwrap_or(60.0);
+        // The settings' shutter is a share of a frame at that rate; here it is the same share of the film's frames.
+        let shutter = f64::from(self.settings.shutter * FRAME_RATE);
         for n in 1..=self.samples.max(1) {
             let share = f64::from(
                 Settings {
@@ -216,15 +237,16 @@ impl FilmJob<'_> {
                 }
                 png_file::write(&path, width, height, &display_pixels(view)?, &[]).map_err(|e| e.to_string())
             }
-            Sink::Ffmpeg(child) => {
+            Sink::Ffmpeg(ffmpeg) => {
                 let pixels = display_pixels(view)?;
-                let piped = child
+                let piped = ffmpeg
+                    .child
                     .stdin
                     .as_mut()
                     .map(|pipe| pipe.write_all(bytemuck::cast_slice(&pixels)));
                 match piped {
                     Some(Ok(())) => Ok(()),
-                    _ => Err(ffmpeg_said(child)),
+                    _ => Err(ffmpeg_said(ffmpeg)),
                 }
             }
         }
@@ -233,11 +255,11 @@ impl FilmJob<'_> {
     fn close(&self, sink: Sink, written: usize) -> Result<String, String> {
         match sink {
             Sink::Pictures => Ok(format!("{written} pictures {}", self.picture(0).display())),
-            Sink::Ffmpeg(mut child) => {
-                drop(child.stdin.take());
-                match child.wait() {
+            Sink::Ffmpeg(mut ffmpeg) => {
+                drop(ffmpeg.child.stdin.take());
+                match ffmpeg.child.wait() {
                     Ok(status) if status.success() => Ok(format!("{written} frames in {}", self.out.display())),
-                    _ => Err(ffmpeg_said(&mut child)),
+                    _ => Err(ffmpeg_said(&mut ffmpeg)),
                 }
             }
         }
@@ -245,22 +267,18 @@ impl FilmJob<'_> {
 }
 
 /// Why ffmpeg stopped.
-fn ffmpeg_said(child: &mut Child) -> String {
-    drop(child.stdin.take());
-    let mut said = String::new();
-    if let Some(pipe) = child.stderr.as_mut() {
-        // What it said before is all that can be told.
-        let _ = std::io::Read::read_to_string(pipe, &mut said);
-    }
-    // It has closed its pipe, so it ends by itself.
-    let _ = child.wait();
+fn ffmpeg_said(ffmpeg: &mut Ffmpeg) -> String {
+    drop(ffmpeg.child.stdin.take());
+    // It has closed its input, so it ends by itself.
+    let _ = ffmpeg.child.wait();
+    let said = std::fs::read_to_string(&ffmpeg.said).unwrap_or_default();
     format!(
         "ffmpeg failed ({}); a name that ends in .png makes numbered pictures",
         said.trim().replace('\n', "; ")
     )
 }
 
-/// Path of a film beside others of its kind: mp4 where ffmpeg is there, else pictures.
-pub fn film_path(stem: &Path) -> PathBuf {
-    stem.with_extension(if has_ffmpeg() { "mp4" } else { "png" })
+/// Extension of a film: mp4 where ffmpeg is there, else that of pictures.
+pub fn film_extension() -> &'static str {
+    if has_ffmpeg() { "mp4" } else { "png" }
 }

@@ -21,9 +21,11 @@ use crate::gpu::GpuError;
 use crate::output::stats::{FrameStats, Summary};
 use crate::render::scene_gpu::RenderError;
 use crate::scene::camera::Camera;
+use crate::scene::clock::Clock;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use winit::dpi::PhysicalSize;
 use winit::window::{Fullscreen, Window};
@@ -36,6 +38,8 @@ const RECENT: usize = 180;
 const IDLE: Duration = Duration::from_millis(30);
 /// How long a notice stays.
 const NOTICE: Duration = Duration::from_secs(4);
+/// With no smaller share of the window's pixels is it tried again after memory has run out.
+const LEAST_SCALE: f64 = 0.25;
 /// A device that is lost twice within this time is not opened again.
 const LOST_TWICE: Duration = Duration::from_secs(30);
 
@@ -43,6 +47,8 @@ const LOST_TWICE: Duration = Duration::from_secs(30);
 pub struct Game {
     pub(super) level: Option<Level>,
     pub(super) loading: Option<Loading>,
+    /// Loadings that nobody waits for any more.
+    pub(super) abandoned: Vec<Loading>,
     pub(super) screen: Screen,
     pub(super) window: Arc<Window>,
     pub(super) platform: egui_winit::State,
@@ -58,10 +64,9 @@ pub struct Game {
     /// Frame times written down by the console's `stats`, and those of the whole run.
     pub(super) stats: Option<StatsRun>,
     pub(super) whole_run: Option<StatsRun>,
-    /// Films being made: what they say about themselves.
-    pub(super) films: Vec<(String, Receiver<FilmNews>)>,
+    pub(super) films: Vec<FilmWork>,
     /// What the last frame showed.
-    pub(super) shown: Option<Camera>,
+    pub(super) shown: Option<(Camera, Clock)>,
     /// Where the player goes on once the map is loaded again.
     pub(super) resume: Option<Resume>,
     pub(super) recent: VecDeque<FrameStats>,
@@ -85,6 +90,15 @@ pub struct Game {
     pub(super) shaders: super::shader_watch::ShaderWatch,
 }
 
+/// A film being made.
+pub(super) struct FilmWork {
+    pub name: String,
+    /// What it says about itself.
+    pub note: String,
+    pub news: Receiver<FilmNews>,
+    pub worker: JoinHandle<()>,
+}
+
 /// News of a film being made.
 pub(super) enum FilmNews {
     Share(f32),
@@ -94,9 +108,9 @@ pub(super) enum FilmNews {
 impl Game {
     /// Begins to load a map; the one that is there stays until that has come.
     pub(super) fn load(&mut self, map: &str) {
-        if let Some(loading) = self.loading.take() {
-            loading.abandon();
-        }
+        self.abandoned.extend(self.loading.take());
+        // Frames of the map and frames without one take turns.
+        self.idle();
         let size = self.traced_size();
         self.shell.hold();
         self.loading = Some(Loading::begin(map, &self.source, &self.shell.cvars, &self.screen, size));
@@ -169,6 +183,7 @@ impl Game {
 
     /// Takes over a map that has come.
     fn take_level(&mut self) {
+        self.abandoned.retain_mut(|loading| loading.take().is_none());
         let Some((map, seconds, outcome)) = self.loading.as_mut().and_then(|loading| {
             let outcome = loading.take()?;
             Some((loading.map.clone(), loading.elapsed().as_secs_f32(), outcome))
@@ -177,6 +192,7 @@ impl Game {
         };
         self.loading = None;
         self.shell.release();
+        self.idle();
         match outcome {
             Ok(mut level) => {
                 self.end_recording();
@@ -184,6 +200,7 @@ impl Game {
                     self.shell.log.warn(warning);
                 }
                 if let Some(resume) = self.resume.take()
+                    && resume.map == level.map
                     && level.play.restore(&resume.state)
                 {
                     (level.camera, level.time) = (resume.camera, resume.time);
@@ -195,7 +212,6 @@ impl Game {
                     .log
                     .say(format!("{map} loaded in {seconds:.2} s ({})", times.join(", ")));
                 self.window.set_title(&format!("q3rays - {map}"));
-                self.idle();
                 self.level = Some(level);
                 self.recent.clear();
                 self.pace.clear();
@@ -204,6 +220,9 @@ impl Game {
             }
             Err(e) => {
                 self.shell.log.warn(&e);
+                // What waited for this map has none.
+                self.playback = None;
+                self.resume = None;
                 if self.level.is_none() {
                     // Nobody would see why nothing is there.
                     self.ui.close_all();
@@ -258,7 +277,7 @@ impl Game {
         let input = self.platform.take_egui_input(&self.window);
         let size = self.window.inner_size();
         let playing = self.playback.as_ref();
-        let shown = self.shown;
+        let shown = self.shown.map(|(camera, _)| camera);
         let player = self.level.as_ref().map(|level| PlayerFacts {
             camera: shown.unwrap_or(level.camera),
             speed: level.play.body.velocity.length(),
@@ -285,6 +304,7 @@ impl Game {
                 .as_ref()
                 .map(|l| (l.map.as_str(), l.progress(), l.elapsed().as_secs_f32())),
             notes,
+            recording: self.recorder.is_some(),
             notice: self.notice.as_ref().map(|(text, _)| text.as_str()),
             player,
             memory: self.screen.device.memory_reserved(),
@@ -316,7 +336,7 @@ impl Game {
         if let Some(s) = &self.stats {
             out.push(format!("frame times: {}", s.frames.len()));
         }
-        out.extend(self.films.iter().map(|(note, _)| note.clone()));
+        out.extend(self.films.iter().map(|film| film.note.clone()));
         out
     }
 
@@ -331,7 +351,7 @@ impl Game {
             std::thread::sleep(IDLE);
             return Ok(shown);
         };
-        self.shown = Some(view.camera);
+        self.shown = Some((view.camera, view.clock));
         let (shown, ended) = level.show(&view, &self.shell.cvars, size, &mut self.screen, painting)?;
         if let Some(stats) = ended {
             self.note_stats(stats);
@@ -346,6 +366,7 @@ impl Game {
     /// What the map shows next; nothing while another is loaded.
     fn next_view(&mut self, seconds: f32) -> Result<Option<View>, RenderError> {
         if self.loading.is_some() {
+            self.input.forget();
             return Ok(None);
         }
         let Some(level) = &mut self.level else {
@@ -353,6 +374,7 @@ impl Game {
         };
         if let Some(playback) = &mut self.playback {
             if let Some(view) = playback.next(seconds) {
+                self.input.forget();
                 return Ok(Some(view));
             }
             self.end_playback()?;
@@ -394,6 +416,13 @@ impl Game {
 
     /// Opens the device anew after it or the window's surface was lost; tells why where that happens again at once.
     fn recover(&mut self, error: RenderError) -> Result<(), CliError> {
+        let scale = self.shell.cvars.number("rt_scale");
+        if matches!(error, RenderError::Gpu(GpuError::OutOfDeviceMemory { .. })) && scale > LEAST_SCALE {
+            self.shell.log.warn(format!("{error}; tracing fewer pixels"));
+            self.shell.set("rt_scale", &(scale * 0.5).to_string());
+            self.restart = true;
+            return Ok(());
+        }
         let lost = matches!(
             error,
             RenderError::Gpu(GpuError::DeviceLost { .. } | GpuError::SurfaceLost { .. })

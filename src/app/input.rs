@@ -59,6 +59,12 @@ impl Input {
         f32::from(self.held(plus)) - f32::from(self.held(minus))
     }
 
+    /// Nobody acts on what was pressed and moved.
+    pub fn forget(&mut self) {
+        self.take_mouse();
+        self.seen();
+    }
+
     /// A step of time has seen what was pressed.
     pub fn seen(&mut self) {
         self.tapped.clear();

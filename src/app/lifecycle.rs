@@ -3,7 +3,7 @@
 use super::folders::Folders;
 use super::game::Game;
 use super::input::Input;
-use super::loading::MapSource;
+use super::loading::{Loading, MapSource};
 use super::screen::{Screen, ScreenOptions};
 use super::ui::Ui;
 use crate::cli::CliError;
@@ -32,7 +32,8 @@ pub struct Start {
     pub folders: Folders,
     pub config: Config,
     pub shell: Shell,
-    pub map: String,
+    /// The map that was asked for; else the one that ships.
+    pub map: Option<String>,
     pub device: String,
     /// Close after so many frames of a map; for tests.
     pub frames: Option<u32>,
@@ -44,6 +45,8 @@ pub struct Start {
     pub lost: Option<Instant>,
     /// Console commands for the map once it is there.
     pub commands: String,
+    /// Lines of the console that have been told already.
+    pub log_seen: u64,
 }
 
 /// Frame times being written down, and where they go.
@@ -64,6 +67,7 @@ impl StatsRun {
 
 /// A player to go on with on the same map.
 pub struct Resume {
+    pub(super) map: String,
     pub(super) state: PlayState,
     pub(super) camera: Camera,
     /// The scene's, seconds.
@@ -114,20 +118,33 @@ impl Game {
             resume,
             lost,
             commands,
+            log_seen,
         } = start;
         let applied = Applied {
             fullscreen: false,
             mode: R_MODES[0].to_owned(),
             ..Applied::wanted(&shell.cvars)
         };
-        let screen =
-            open_screen(&window, &shell.cvars, &device, &folders, applied.present_mode()).map_err(|e| match e {
-                GpuError::NoLoader(_) | GpuError::NoDevice => {
-                    CliError::NoWindow(format!("the window needs a Vulkan device ({e}): running without one"))
-                }
-                other => CliError::failed(other),
-            })?;
-        if screen.on_cpu() && shell.cvars.number("r_mode") == 0.0 {
+        let again = resume.is_some() || log_seen > 0;
+        let mode = applied.present_mode();
+        let mut opened = open_screen(&window, &shell.cvars, &device, &folders, mode);
+        if let Err(e @ (GpuError::MissingFeature { .. } | GpuError::Unsupported(_))) = &opened
+            && shell.cvars.number("rt_backend") != 0.0
+        {
+            // Whoever kept it in their settings would never get in again.
+            let warning = format!("{e}; rt_backend is auto now");
+            eprintln!("warning: {warning}");
+            shell.log.warn(warning);
+            shell.set("rt_backend", "auto");
+            opened = open_screen(&window, &shell.cvars, &device, &folders, mode);
+        }
+        let screen = opened.map_err(|e| match e {
+            GpuError::NoLoader(_) | GpuError::NoDevice => {
+                CliError::NoWindow(format!("the window needs a Vulkan device ({e}): running without one"))
+            }
+            other => CliError::failed(other),
+        })?;
+        if screen.on_cpu() && !again && shell.cvars.number("r_mode") == 0.0 {
             // The answer, where there is one at once, comes as a resize event otherwise.
             let _ = window.request_inner_size(PhysicalSize::new(SMALL_SIZE.0, SMALL_SIZE.1));
         }
@@ -138,7 +155,7 @@ impl Game {
         for warning in &source.files.warnings {
             shell.log.warn(warning);
         }
-        let ui = Ui::new(source.files.clone(), resume.is_none());
+        let ui = Ui::new(source.files.clone(), !again);
         let platform = egui_winit::State::new(
             ui.context.clone(),
             egui::ViewportId::ROOT,
@@ -150,6 +167,7 @@ impl Game {
         let mut game = Self {
             level: None,
             loading: None,
+            abandoned: Vec::new(),
             screen,
             platform,
             ui,
@@ -174,7 +192,7 @@ impl Game {
             last_frame: Instant::now(),
             last_report: Instant::now(),
             notice: None,
-            log_seen: 0,
+            log_seen,
             applied,
             lost,
             frames_left: frames,
@@ -188,7 +206,12 @@ impl Game {
         };
         // Scripts of the user's own come first, the command line's commands once the map is there.
         game.run_console();
-        game.load(&map);
+        match map {
+            Some(map) => game.load(&map),
+            // Those scripts may have named one.
+            None if game.loading.is_none() => game.load(fly_through::MAP),
+            None => {}
+        }
         game.shell.push(&commands);
         game.shell.hold();
         Ok(game)
@@ -199,21 +222,20 @@ impl Game {
     /// # Errors
     /// One sentence where there is no device any more.
     pub fn reopen(mut self) -> Result<Self, CliError> {
-        self.end_recording();
-        let coming = self.loading.take().map(|loading| {
-            let map = loading.map.clone();
-            loading.abandon();
-            map
-        });
+        self.put_down();
+        let coming = self.loading.as_ref().map(|loading| loading.map.clone());
+        self.join_threads();
         let level = self.level.take();
-        let resume = level.as_ref().filter(|_| coming.is_none()).map(|level| Resume {
-            state: level.play.state(),
-            camera: level.camera,
-            time: level.time,
+        let resume = self.resume.take().or_else(|| {
+            level.as_ref().map(|level| Resume {
+                map: level.map.clone(),
+                state: level.play.state(),
+                camera: level.camera,
+                time: level.time,
+            })
         });
-        let map = coming.or(level.as_ref().map(|l| l.map.clone()));
-        let start = Start {
-            map: map.unwrap_or_else(|| fly_through::MAP.to_owned()),
+        let mut start = Start {
+            map: coming.or(level.as_ref().map(|l| l.map.clone())),
             source: self.source.clone(),
             folders: self.folders.clone(),
             device: self.device.clone(),
@@ -221,20 +243,58 @@ impl Game {
             stats: self.whole_run.take(),
             lost: self.lost,
             commands: String::new(),
+            log_seen: self.log_seen,
             resume,
             shell: std::mem::take(&mut self.shell),
             config: self.config,
         };
-        let window = self.window.clone();
-        let (applied, focused, log_seen) = (self.applied, self.focused, self.log_seen);
-        // A window has one device at a time.
-        drop((level, self.films, self.screen));
-        let mut start = start;
         start.shell.hold();
-        let mut game = Self::new(window, start)?;
-        (game.applied, game.focused) = (applied, focused);
-        game.log_seen = log_seen;
+        let window = self.window.clone();
+        let (applied, focused, captured) = (self.applied, self.focused, self.captured);
+        // A window has one device at a time.
+        drop((level, self.screen));
+        let mut game = Self::new(window, start).map_err(|e| match e {
+            // Nothing else begins in the middle of a game.
+            CliError::NoWindow(reason) => CliError::Failed(reason),
+            other => other,
+        })?;
+        (game.applied, game.focused, game.captured) = (applied, focused, captured);
         Ok(game)
+    }
+
+    /// Writes what is being recorded and what is kept; what goes wrong is told.
+    fn put_down(&mut self) {
+        self.end_recording();
+        if let Err(e) = self.end_playback() {
+            eprintln!("warning: the playback's times are not kept: {e}");
+        }
+        if let Some(level) = &mut self.level {
+            match level.realtime.finish() {
+                Ok(rest) => rest.into_iter().for_each(|stats| self.note_stats(stats)),
+                Err(e) => eprintln!("warning: {e}"),
+            }
+        }
+        if let Some(run) = self.stats.take()
+            && let Err(e) = self.write_stats(&run)
+        {
+            eprintln!("warning: {e}");
+        }
+        if let Err(e) = self.config.write(&self.shell) {
+            eprintln!("warning: the settings are not kept: {e}");
+        }
+    }
+
+    /// Waits for all that still uses the device. Films are cut short.
+    fn join_threads(&mut self) {
+        for film in self.films.drain(..) {
+            eprintln!("warning: the {} is cut short", film.note);
+            drop(film.news);
+            if film.worker.join().is_err() {
+                tracing::warn!("the film {} broke off", film.name);
+            }
+        }
+        self.abandoned.extend(self.loading.take());
+        self.abandoned.drain(..).for_each(Loading::join);
     }
 
     /// Ends: writes what is to be kept and waits for the GPU.
@@ -242,17 +302,8 @@ impl Game {
     /// # Errors
     /// One sentence where the run's frame times cannot be written.
     pub fn close(mut self) -> Result<(), CliError> {
-        self.end_recording();
-        if let Some(loading) = self.loading.take() {
-            loading.abandon();
-        }
-        if let Err(e) = self.config.write(&self.shell) {
-            eprintln!("warning: the settings are not kept: {e}");
-        }
-        if let Some(level) = &mut self.level {
-            let rest = level.realtime.finish().map_err(CliError::failed)?;
-            rest.into_iter().for_each(|stats| self.note_stats(stats));
-        }
+        self.put_down();
+        self.join_threads();
         self.idle();
         match self.whole_run.take() {
             Some(run) => self.write_stats(&run).map_err(CliError::Failed),

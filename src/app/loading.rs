@@ -94,8 +94,8 @@ impl Loading {
         Some(joined.unwrap_or_else(|_| Err("the map's loading broke off: please report this as a bug".to_owned())))
     }
 
-    /// Waits for the end and forgets what came out.
-    pub fn abandon(mut self) {
+    /// Waits for the end and forgets what comes out.
+    pub fn join(mut self) {
         if let Some(worker) = self.worker.take()
             && worker.join().is_err()
         {

@@ -76,8 +76,11 @@ pub fn walk(
         yaw: camera.yaw,
         fast: input.held(Button::Speed),
     };
+    let steps = play.steps;
     let events = play.advance(step.seconds, step.clock, step.frozen, &command);
-    input.seen();
+    if play.steps > steps {
+        input.seen();
+    }
     for event in &events {
         if let Event::Turned(yaw) = event {
             (camera.yaw, camera.pitch) = (yaw.rem_euclid(360.0), 0.0);

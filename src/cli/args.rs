@@ -88,7 +88,7 @@ impl ConsoleWords {
 }
 
 /// Splits `+set NAME VALUE` and `+COMMAND ARGS…` from the ordinary arguments. A console command's arguments end at the
-/// next word that begins with `+` or `-`, except that `set` always takes two.
+/// next word that begins with `+`, or with `-` and is no number, except that `set` always takes two.
 fn split_console(args: Vec<OsString>) -> Result<(Vec<OsString>, ConsoleWords), CliError> {
     let mut plain = Vec::new();
     let mut console = ConsoleWords::default();
@@ -111,7 +111,8 @@ fn split_console(args: Vec<OsString>) -> Result<(Vec<OsString>, ConsoleWords), C
         let mut words = vec![command.to_owned()];
         while let Some(next) = args.peek() {
             let text = next.to_string_lossy();
-            if text.starts_with('+') || text.starts_with('-') {
+            let option = text.starts_with('-') && text.parse::<f64>().is_err();
+            if text.starts_with('+') || option {
                 break;
             }
             words.push(text.into_owned());
@@ -120,6 +121,11 @@ fn split_console(args: Vec<OsString>) -> Result<(Vec<OsString>, ConsoleWords), C
         console.commands.push(words);
     }
     Ok((plain, console))
+}
+
+/// Whether there is a window whose console takes commands.
+fn plays(cli: &Cli) -> bool {
+    matches!(cli.command, None | Some(Command::Play(_)))
 }
 
 fn dispatch() -> CliResult {
@@ -140,14 +146,13 @@ fn dispatch() -> CliResult {
     for words in &console.commands {
         let name = words[0].as_str();
         match &words[1..] {
-            [] if name == "quit" => return Ok(()),
+            [] if name == "quit" && !plays(&cli) => return Ok(()),
             [_] if matches!(name, "map" | "devmap") => {}
             _ if matches!(name, "map" | "devmap") => {
                 return Err(CliError::Usage(format!("+{name} needs the name of a map")));
             }
             // What the window's console does.
-            _ if matches!(cli.command, None | Some(Command::Play(_)))
-                && (find(name).is_some() || cvar(name).is_some()) => {}
+            _ if plays(&cli) && (find(name).is_some() || cvar(name).is_some()) => {}
             _ => {
                 let hint = meant(name)
                     .map(|n| format!(" (did you mean +{n}?)"))

@@ -6,11 +6,10 @@ use super::render::Args;
 use crate::app::film::FilmJob;
 use crate::app::headless::run_stats;
 use crate::console::Cvars;
-use crate::console::settings::{FRAME_RATE, settings};
+use crate::console::settings::settings;
 use crate::engine::Prepared;
 use crate::game::recording::Recording;
 use crate::output::stdout;
-use crate::render::settings::Settings;
 use std::path::Path;
 
 /// Renders a recording frame by frame, or at fixed steps of time where `--fps` is given.
@@ -27,14 +26,11 @@ pub fn run(common: &Common, cvars: &Cvars, args: &Args, path: &Path) -> CliResul
                 .to_owned(),
         ));
     };
-    let base = settings(cvars);
     let job = FilmJob {
         scene: on_gpu,
         recording: &recording,
-        settings: Settings {
-            shutter: base.shutter * args.fps.map_or(1.0, |fps| FRAME_RATE / fps as f32),
-            ..base
-        },
+        settings: settings(cvars),
+        cache: None,
         size: args.size,
         fps: args.fps,
         samples: args.spp.unwrap_or(1),

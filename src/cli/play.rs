@@ -33,12 +33,9 @@ pub struct Args {
 
 /// Opens the window on a map, or does a run without one where there is no display. `cvars`: as the command line sets them.
 pub fn run(common: &Common, cvars: Cvars, args: Args, words: ConsoleWords) -> CliResult {
-    let map = words
-        .map()
-        .or(args.map.clone())
-        .unwrap_or_else(|| DEFAULT_MAP.to_owned());
+    let map = words.map().or(args.map.clone());
     if window::has_display() && cvars.get("rt_backend").as_deref() != Some("cpu") {
-        match in_window(common, &map, &args, &words) {
+        match in_window(common, map.clone(), &args, &words) {
             Err(CliError::NoWindow(reason)) => eprintln!("{reason}"),
             done => return done,
         }
@@ -47,6 +44,7 @@ pub fn run(common: &Common, cvars: Cvars, args: Args, words: ConsoleWords) -> Cl
     } else {
         stdout::line("no display: running without a window").map_err(CliError::failed)?;
     }
+    let map = map.unwrap_or_else(|| DEFAULT_MAP.to_owned());
     let (scene, _) = common.played_scene(&map, &cvars)?;
     let engine = common.engine(&cvars)?;
     let bar = progress(1000, &map);
@@ -57,7 +55,7 @@ pub fn run(common: &Common, cvars: Cvars, args: Args, words: ConsoleWords) -> Cl
     done
 }
 
-fn in_window(common: &Common, map: &str, args: &Args, words: &ConsoleWords) -> CliResult {
+fn in_window(common: &Common, map: Option<String>, args: &Args, words: &ConsoleWords) -> CliResult {
     let folders = Folders::new(common.home.as_deref());
     let files = Arc::new(common.files()?);
     let mut shell = Shell::default();
@@ -106,12 +104,13 @@ fn in_window(common: &Common, map: &str, args: &Args, words: &ConsoleWords) -> C
         folders,
         config,
         shell,
-        map: map.to_owned(),
+        map,
         device: common.device.clone().unwrap_or_else(|| "auto".to_owned()),
         frames: args.frames,
         stats: args.stats.clone().map(StatsRun::new),
         resume: None,
         lost: None,
+        log_seen: 0,
         commands: commands.join("\n"),
     })
 }

@@ -17,6 +17,8 @@ pub struct Config {
     path: PathBuf,
     /// Variable, what it was in the file, and what the command line set.
     overrides: Vec<(&'static str, String, String)>,
+    /// It could not be read: what it holds must not be lost.
+    unread: bool,
 }
 
 /// Nothing that a configuration file may call.
@@ -33,16 +35,17 @@ impl Config {
     /// understood is taken, and a file that cannot all be is kept beside its place.
     pub fn load(folder: &Path, shell: &mut Shell) -> (Self, Option<String>) {
         let path = folder.join(FILE);
-        let config = |path| Self {
+        let config = |path, unread| Self {
             path,
             overrides: Vec::new(),
+            unread,
         };
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return (config(path), None),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return (config(path, false), None),
             Err(e) => {
                 let message = format!("cannot read {} ({e}): starting with the defaults", path.display());
-                return (config(path), Some(message));
+                return (config(path, true), Some(message));
             }
         };
         let (understood, wrong) = match std::str::from_utf8(&bytes) {
@@ -59,7 +62,7 @@ impl Config {
             };
             format!("{} is damaged: {first}; {kept}, the rest of it is used", path.display())
         });
-        (config(path), message)
+        (config(path, false), message)
     }
 
     /// Sets a variable for this run: the file keeps what it had unless the variable is changed again.
@@ -86,13 +89,24 @@ impl Config {
     /// # Errors
     /// One sentence naming the file.
     pub fn write(&self, shell: &Shell) -> Result<(), String> {
+        if self.unread {
+            return Err(format!(
+                "{} could not be read and is left as it is",
+                self.path.display()
+            ));
+        }
+        if std::fs::metadata(&self.path).is_ok_and(|m| m.permissions().readonly()) {
+            return Err(format!("{} may only be read", self.path.display()));
+        }
         let mut cvars = shell.cvars.clone();
         for (name, before, set) in &self.overrides {
-            if cvars.get(name).as_ref() == Some(set) {
+            if cvars.get(name).as_ref() == Some(set) && !shell.touched.contains(name) {
                 cvars.set(name, before).map_err(|e| e.to_string())?;
             }
         }
-        write_to(&self.path, &cvars, shell)
+        // Some keep a link to it elsewhere.
+        let path = self.path.canonicalize().unwrap_or_else(|_| self.path.clone());
+        write_to(&path, &cvars, shell)
     }
 
     /// Where the file lies.
@@ -188,11 +202,34 @@ mod tests {
         assert!(set.is_ok());
         assert!(config.set_for_this_run(&mut shell.cvars, "cg_fov", "70").is_ok());
         shell.set("cg_fov", "100");
+        assert!(config.set_for_this_run(&mut shell.cvars, "rt_taaGamma", "3").is_ok());
+        shell.set("rt_taaGamma", "3");
         config.write(&shell).expect("written");
         let mut again = Shell::default();
         Config::load(folder.path(), &mut again);
         assert_eq!(again.cvars.get("rt_exposure").as_deref(), Some("2"));
+        assert_eq!(
+            again.cvars.get("rt_taaGamma").as_deref(),
+            Some("3"),
+            "chosen again by hand"
+        );
         assert_eq!(again.cvars.get("cg_fov").as_deref(), Some("100"));
+    }
+
+    #[test]
+    fn what_may_only_be_read_is_left_alone() {
+        let folder = folder();
+        let path = folder.path().join(FILE);
+        std::fs::write(&path, "seta cg_fov 80\n").expect("written");
+        let mut permissions = std::fs::metadata(&path).expect("its rights").permissions();
+        permissions.set_readonly(true);
+        std::fs::set_permissions(&path, permissions).expect("its rights");
+        let mut shell = Shell::default();
+        let (config, message) = Config::load(folder.path(), &mut shell);
+        assert_eq!((message, shell.cvars.number("cg_fov")), (None, 80.0));
+        shell.set("cg_fov", "100");
+        assert!(config.write(&shell).is_err_and(|e| e.contains("may only be read")));
+        assert_eq!(std::fs::read(&path).ok().as_deref(), Some(&b"seta cg_fov 80\n"[..]));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::cvars::{Cvars, cvar};
 use super::log::Log;
 use super::table::{CVARS, Kind};
 use super::tokens::{self, MOST_COMMANDS};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 /// Most commands that run in one frame: scripts that call themselves end there.
 const MOST_AT_ONCE: usize = 10_000;
@@ -81,6 +81,8 @@ pub struct Shell {
     pub binds: Binds,
     pub log: Log,
     pub names: Names,
+    /// Variables that were set by hand.
+    pub touched: BTreeSet<&'static str>,
     queue: VecDeque<Vec<String>>,
     /// Commands that wait for a map.
     held: VecDeque<Vec<String>>,
@@ -313,6 +315,7 @@ impl Shell {
         let before = self.cvars.get(name);
         match self.cvars.set(name, value) {
             Ok(note) => {
+                self.touched.extend(cvar(name).map(|c| c.name));
                 note.into_iter().for_each(|n| self.log.warn(n));
                 if cvar(name).is_some_and(|c| c.on_load) && self.cvars.get(name) != before {
                     let when = if name.eq_ignore_ascii_case("rt_backend") {

@@ -90,6 +90,8 @@ pub struct Play {
     behind: f32,
     /// Scene time of the last step.
     stepped: Clock,
+    /// Steps so far.
+    pub steps: u64,
     frozen: bool,
 }
 
@@ -111,6 +113,7 @@ impl Play {
             placed: Vec::new(),
             behind: 0.0,
             stepped: Clock::default(),
+            steps: 0,
             frozen: false,
             body: Body::default(),
             health: HEALTH,
@@ -207,6 +210,7 @@ impl Play {
 
     /// One step of time, which ends at `clock`.
     pub fn step(&mut self, clock: Clock, command: &Command, events: &mut Vec<Event>) {
+        self.steps += 1;
         self.move_models(clock, events);
         let world = World {
             collision: &self.collision,

@@ -299,6 +299,12 @@ impl Device {
         }
     }
 
+    /// Bytes of GPU memory in use.
+    pub fn memory_allocated(&self) -> u64 {
+        let allocator = self.allocator.lock().unwrap_or_else(PoisonError::into_inner);
+        allocator.generate_report().total_allocated_bytes
+    }
+
     /// Bytes of GPU memory taken from the driver so far.
     pub fn memory_reserved(&self) -> u64 {
         self.allocator.lock().unwrap_or_else(PoisonError::into_inner).capacity()

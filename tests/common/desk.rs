@@ -20,6 +20,8 @@ pub struct Desk {
     pub pictures: PathBuf,
     /// Bytes of the log that have been waited for.
     read: usize,
+    /// Questions asked, so that each has an answer of its own.
+    asked: u32,
 }
 
 fn run(display: &str, program: &str, arguments: &[&str]) -> String {
@@ -74,13 +76,24 @@ impl Desk {
             log,
             pictures,
             read: 0,
+            asked: 0,
         };
         desk.window = wait_for("the window", || {
             let found = run(&desk.display, "xdotool", &["search", "--name", "q3rays"]);
             found.lines().next().map(str::to_owned)
         });
         desk.window_command("windowfocus", &[]);
+        desk.check_layer();
         desk
+    }
+
+    /// The validation layer is in the program: without it nothing that is wrong would be told.
+    fn check_layer(&self) {
+        let maps = format!("/proc/{}/maps", self.program.id());
+        wait_for("the validation layer", || {
+            let loaded = std::fs::read_to_string(&maps).unwrap_or_default();
+            loaded.contains("VkLayer_khronos_validation").then_some(())
+        });
     }
 
     /// An xdotool command on the window.
@@ -153,9 +166,12 @@ impl Desk {
 
     /// Where the eye is: x, y, z, yaw, pitch.
     pub fn view(&mut self) -> [f32; 5] {
-        self.console(&["viewpos; echo seen"], "seen\n");
+        self.asked += 1;
+        let (begin, end) = (format!("begin{}", self.asked), format!("end{}", self.asked));
+        self.console(&[&format!("echo {begin}; viewpos; echo {end}")], &format!("{end}\n"));
         let all = self.text();
-        let line = all.lines().rev().find_map(|l| {
+        let told = all.split(&format!("{begin}\n")).last().unwrap_or_default();
+        let line = told.lines().find_map(|l| {
             let numbers: Vec<f32> = l.split_whitespace().filter_map(|w| w.parse().ok()).collect();
             <[f32; 5]>::try_from(numbers).ok()
         });

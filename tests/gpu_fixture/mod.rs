@@ -2,9 +2,6 @@
 //!
 //! `Q3RAYS_TEST_DEVICE` chooses another device (index or part of a name) than the automatic choice.
 
-// Every test file is its own program and uses its own part of this module.
-#![allow(dead_code)]
-
 use std::sync::Arc;
 
 use ash::vk;

@@ -65,6 +65,9 @@ impl ConsolePanel {
         ui.separator();
         self.keys(ui, shell);
         ui.horizontal(|ui| {
+            if ui.small_button("copy all").clicked() {
+                ui.ctx().copy_text(shell.log.plain());
+            }
             ui.label(RichText::new("]").monospace().color(super::style::ACCENT));
             let id = egui::Id::new("console line");
             let edit = TextEdit::singleline(&mut self.line)
@@ -95,7 +98,7 @@ impl ConsolePanel {
         let font = FontId::monospace(ui.text_style_height(&egui::TextStyle::Monospace) * 0.85);
         let scrolled = std::mem::take(&mut self.scroll);
         let width = ui.available_width();
-        let out = ScrollArea::vertical()
+        ScrollArea::vertical()
             .max_height(height)
             .min_scrolled_height(height)
             .auto_shrink([false, false])
@@ -110,18 +113,6 @@ impl ConsolePanel {
                     ui.label(coloured(line, &font));
                 }
             });
-        let menu = egui::Rect::from_min_size(out.inner_rect.min, out.inner_rect.size());
-        let response = ui.interact(menu, "console text".into(), egui::Sense::hover());
-        response.context_menu(|ui| {
-            if ui.button("Copy all").clicked() {
-                ui.ctx().copy_text(shell.log.plain());
-                ui.close();
-            }
-            if ui.button("Clear").clicked() {
-                shell.log.clear();
-                ui.close();
-            }
-        });
     }
 
     /// Keys that the line must not get.

@@ -66,11 +66,13 @@ fn recordings(ui: &mut egui::Ui, facts: &Facts<'_>, shell: &mut Shell, choice: &
                 *choice = Some(Choice::Resume);
             }
         };
-        if facts.notes.is_empty() {
-            run(ui, "Record my way", "record");
-        } else {
+        let watching = facts.player.as_ref().is_some_and(|p| p.watching);
+        if facts.recording {
             run(ui, "End the recording", "stoprecord");
+        } else if watching {
             run(ui, "End the playback", "stopplayback");
+        } else {
+            run(ui, "Record my way", "record");
         }
         let names: Vec<String> = shell
             .names

@@ -42,6 +42,8 @@ pub struct Facts<'a> {
     pub loading: Option<(&'a str, Progress, f32)>,
     /// What goes on beside: recordings, films.
     pub notes: Vec<String>,
+    /// The way is being recorded.
+    pub recording: bool,
     /// What has just happened.
     pub notice: Option<&'a str>,
     /// Of GPU memory taken, bytes.
@@ -141,6 +143,13 @@ impl Ui {
         let mut events = std::mem::take(&mut self.later);
         events.append(&mut input.events);
         if self.console_open {
+            // A held key that repeats faster than frames come does not go on after it was let go.
+            let mut repeats = 0;
+            events.retain(|event| {
+                let repeat = console::acts_on_line(event) && matches!(event, egui::Event::Key { repeat: true, .. });
+                repeats += usize::from(repeat);
+                !repeat || repeats == 1
+            });
             let acts = events.iter().position(console::acts_on_line);
             let cut = match acts {
                 Some(0) => 1 + usize::from(events.len() > 1 && console::is_release(&events[1])),
