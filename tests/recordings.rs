@@ -152,6 +152,50 @@ fn films_come_out_the_same_each_time() {
     assert!(averaged == make("f", "64x36", &more), "bit for bit");
 }
 
+/// A stand-in for ffmpeg keeps what it is given: every frame's pixels come through, and what goes wrong there is told.
+#[cfg(unix)]
+#[test]
+fn ffmpeg_gets_every_frame() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("way.json");
+    let (mut recording, _) = record("showcase", 60);
+    recording.frames.truncate(8);
+    recording.write(&path).expect("written");
+    let program = folder.path().join("ffmpeg");
+    let run = |script: &str| {
+        std::fs::write(&program, script).expect("written");
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("its rights");
+        Process::new(env!("CARGO_BIN_EXE_q3rays"))
+            .args([
+                "render",
+                "showcase",
+                "--backend",
+                "bvh",
+                "--size",
+                "32x18",
+                "--out",
+                "way.mp4",
+                "--path",
+            ])
+            .arg(&path)
+            .env("PATH", format!("{}:/usr/bin:/bin", folder.path().display()))
+            .current_dir(folder.path())
+            .output()
+            .expect("the program starts")
+    };
+    let out = run("#!/bin/sh\nfor last; do :; done\ncat > \"$last\"\n");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let raw = std::fs::read(folder.path().join("way.mp4")).expect("the film");
+    assert_eq!(raw.len(), 8 * 32 * 18 * 3);
+    assert!(raw.iter().any(|b| *b > 100));
+    let out = run("#!/bin/sh\necho no codec >&2\nexit 1\n");
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(1) && said.contains("no codec"), "{said}");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).expect("a folder").flatten().collect();
+    assert_eq!(left.len(), 3, "no file of ffmpeg's words is left: {left:?}");
+}
+
 #[test]
 fn bad_recordings_are_told() {
     let folder = tempfile::tempdir().expect("a temporary folder");

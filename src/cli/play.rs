@@ -71,7 +71,7 @@ fn in_window(common: &Common, map: Option<String>, args: &Args, words: &ConsoleW
         .chain(common.sets())
     {
         let note = config
-            .set_for_this_run(&mut shell.cvars, name, value)
+            .set_for_this_run(&mut shell, name, value)
             .map_err(CliError::Usage)?;
         note.into_iter().for_each(|n| eprintln!("{n}"));
     }

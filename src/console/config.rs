@@ -69,7 +69,8 @@ impl Config {
     ///
     /// # Errors
     /// One sentence for an unknown name or a wrong value.
-    pub fn set_for_this_run(&mut self, cvars: &mut Cvars, name: &str, value: &str) -> Result<Option<String>, String> {
+    pub fn set_for_this_run(&mut self, shell: &mut Shell, name: &str, value: &str) -> Result<Option<String>, String> {
+        let cvars = &mut shell.cvars;
         let before = cvars.get(name);
         let note = cvars.set(name, value).map_err(|e| e.to_string())?;
         if let (Some(c), Some(before), Some(now)) = (super::cvars::cvar(name), before, cvars.get(name)) {
@@ -80,6 +81,7 @@ impl Config {
                 .map(|(_, before, _)| before.clone());
             self.overrides.retain(|(n, ..)| *n != c.name);
             self.overrides.push((c.name, first.unwrap_or(before), now));
+            shell.touched.remove(c.name);
         }
         Ok(note)
     }
@@ -198,11 +200,11 @@ mod tests {
         let mut shell = Shell::default();
         let (mut config, _) = Config::load(folder.path(), &mut shell);
         shell.set("rt_exposure", "2");
-        let set = config.set_for_this_run(&mut shell.cvars, "rt_exposure", "9");
+        let set = config.set_for_this_run(&mut shell, "rt_exposure", "9");
         assert!(set.is_ok());
-        assert!(config.set_for_this_run(&mut shell.cvars, "cg_fov", "70").is_ok());
+        assert!(config.set_for_this_run(&mut shell, "cg_fov", "70").is_ok());
         shell.set("cg_fov", "100");
-        assert!(config.set_for_this_run(&mut shell.cvars, "rt_taaGamma", "3").is_ok());
+        assert!(config.set_for_this_run(&mut shell, "rt_taaGamma", "3").is_ok());
         shell.set("rt_taaGamma", "3");
         config.write(&shell).expect("written");
         let mut again = Shell::default();
