@@ -155,6 +155,7 @@ fn dispatch() -> CliResult {
             _ if plays(&cli) && (find(name).is_some() || cvar(name).is_some()) => {}
             _ => {
                 let hint = meant(name)
+                    .filter(|n| !n.eq_ignore_ascii_case(name))
                     .map(|n| format!(" (did you mean +{n}?)"))
                     .unwrap_or_default();
                 return Err(CliError::Usage(format!(
