@@ -148,6 +148,11 @@ impl Game {
             // The answer, where there is one at once, comes as a resize event otherwise.
             let _ = window.request_inner_size(PhysicalSize::new(SMALL_SIZE.0, SMALL_SIZE.1));
         }
+        if shell.cvars.get("rt_backend").as_deref() == Some("cpu") {
+            shell
+                .log
+                .warn("the CPU tracer has no window: rt_backend is as if it were auto");
+        }
         shell.names = folders.names(&source.files);
         shell
             .log
