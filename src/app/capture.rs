@@ -1,9 +1,9 @@
 //! Pictures of what is shown, with what is needed to make them again.
 
+use super::headless::run_stats;
 use super::level::Level;
 use crate::console::Cvars;
 use crate::engine::Engine;
-use crate::output::stats::{RunStats, Summary};
 use crate::output::{atomic, exr_file, png_file};
 use crate::render::gpu_renderer::{film, shown_film};
 use crate::render::view_state::ViewState;
@@ -27,17 +27,8 @@ fn texts(
     engine: &Engine,
     cvars: &Cvars,
 ) -> Vec<(&'static str, String)> {
-    let mut run = RunStats {
-        device: String::new(),
-        backend: String::new(),
-        driver: String::new(),
-        map: level.map.clone(),
-        size: [level.realtime.view.gbuffer.size.0, level.realtime.view.gbuffer.size.1],
-        settings: cvars.all(),
-        frames: Vec::new(),
-        summary: Summary::of(Vec::new()),
-    };
-    engine.label(&mut run);
+    let size = level.realtime.view.gbuffer.size;
+    let run = run_stats(engine, cvars, &level.map, size, Vec::new());
     let c = camera;
     vec![
         ("Software", concat!("q3rays ", env!("CARGO_PKG_VERSION")).to_owned()),

@@ -1,6 +1,7 @@
 //! Films of recordings: frames at fixed steps of time, each as fine as is wanted, as numbered pictures or through ffmpeg.
 
 use super::capture::display_pixels;
+use super::level::EXPOSURE_RATE;
 use crate::console::settings::FRAME_RATE;
 use crate::game::recording::{RecordedView, Recording};
 use crate::gpu::{PipelineCache, SubmitSync};
@@ -11,14 +12,11 @@ use crate::render::gpu_renderer::{film, shown_film};
 use crate::render::realtime::Realtime;
 use crate::render::scene_gpu::SceneGpu;
 use crate::render::settings::Settings;
-use crate::scene::camera::Camera;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
-/// Share of the way to the wanted exposure per second, as in the window.
-const EXPOSURE_RATE: f64 = 2.0;
 /// Most frames of a film.
 const MOST_FRAMES: f64 = 1e6;
 
@@ -186,7 +184,7 @@ impl FilmJob<'_> {
             let last = n == self.samples.max(1);
             let seconds = self.frame_seconds(index);
             let input = FrameInput {
-                camera: Camera { ..view.camera },
+                camera: view.camera,
                 settings: Settings {
                     clock: view.clock,
                     shutter: 0.0,
@@ -200,7 +198,7 @@ impl FilmJob<'_> {
                 exposure_blend: if index == 0 {
                     1.0
                 } else {
-                    (EXPOSURE_RATE * seconds).min(1.0) as f32
+                    (EXPOSURE_RATE * seconds as f32).min(1.0)
                 },
                 reuse: !averaged,
                 output: last,

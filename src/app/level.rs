@@ -27,7 +27,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Share of the way to the wanted exposure per second.
-const EXPOSURE_RATE: f32 = 2.0;
+pub const EXPOSURE_RATE: f32 = 2.0;
 
 /// A map, the player and its frames.
 pub struct Level {
