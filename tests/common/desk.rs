@@ -183,6 +183,14 @@ impl Desk {
         std::fs::read_to_string(&self.log).unwrap_or_default()
     }
 
+    /// Ends the program through its console, which is closed.
+    pub fn quit(&mut self) {
+        self.key(&["grave"]);
+        std::thread::sleep(Duration::from_millis(600));
+        self.enter("quit");
+        assert_eq!(self.ended(), Some(0));
+    }
+
     /// Waits for the end of the program and returns its exit code.
     pub fn ended(&mut self) -> Option<i32> {
         let program = &mut self.program;
