@@ -3,15 +3,29 @@
 //
 // It keeps energy: c' = c + Σ w(p,q)·(c_q − c_p) with w(p,q) = w(q,p), so that what one pixel gives its neighbour gets (of the result
 // shown; what is fed back is a mixture by pixel), and
-// Σ w ≤ 3/4. A level takes the kernel (1 2 1) ⊗ (1 2 1) / 16 at 2^level pixels.
+// Σ w ≤ 3/4. A level takes the kernel (1 2 1) ⊗ (1 2 1) / 16 at 2^level pixels: all eight neighbours, since with four a level, which is
+// faster, a lone bright sample became a lattice of dots.
+//
+// Unpacking is what costs, so each pixel is unpacked once by the work group that needs it, into shared memory. A group makes 32 columns
+// of rows that are a step apart: with their neighbours these are 10 rows for 8, and rows are read as they lie in memory.
 #extension GL_GOOGLE_include_directive : require
 #include "prelude.glsl"
 #include "gbuffer.glsl"
+#include "channel.glsl"
 #include "guide.glsl"
 #include "luminance.glsl"
 #include "packed.glsl"
+#include "secondary_tiles.glsl"
 
-layout(local_size_x = 16, local_size_y = 8) in;
+layout(local_size_x = 32, local_size_y = 4) in;
+layout(constant_id = 0) const int LEVEL = 0;
+
+const int STEP = 1 << LEVEL;
+// What a group makes, and what it reads for that.
+const int WIDTH = 32;
+const int ROWS = 8;
+const int READ_WIDTH = WIDTH + 2 * STEP;
+const int READ = READ_WIDTH * (ROWS + 2);
 
 // Standard deviations of the difference that two pixels of one surface may have.
 const float SIGMA_LUMINANCE = 4.0;
@@ -23,80 +37,208 @@ const float NORMAL_FALL = 20.0;
 // Frames up to which the first level's result is all that the next frame starts from.
 const float FED_BACK = 7.0;
 
-// All eight: with four a level, which is faster, a lone bright sample became a lattice of dots.
-const int TAPS = 8;
+const float LOG2_E = 1.4426950408889634;
+// Squared deviation of a pixel's luminance, in units of its weight's exponent, over its variance.
+const float SQUARED = SIGMA_LUMINANCE * SIGMA_LUMINANCE / (LOG2_E * LOG2_E);
 
-ivec2 neighbour(int i) {
-    int k = i < 4 ? i : i + 1;
-    return ivec2(k % 3 - 1, k / 3 - 1) << level;
+// A pixel; in shared memory as depth, normal (halves), deviation (the upper half of a float), luminance; red and blue.
+struct Texel {
+    float depth;
+    vec3 normal;
+    // Squared, of the luminance: what differences are held against.
+    float deviation;
+    // Luminance, red and blue, from which green follows: the filter is linear.
+    vec3 lrb;
+};
+
+shared bool group_branches;
+shared uvec4 near_a[READ];
+shared uvec2 near_b[READ];
+
+void keep(int at, Texel t) {
+    uint last = (packHalf2x16(vec2(t.normal.z, 0.0)) & 0xffffu) | (floatBitsToUint(t.deviation) & 0xffff0000u);
+    near_a[at] = uvec4(floatBitsToUint(t.depth), packHalf2x16(t.normal.xy), last, floatBitsToUint(t.lrb.x));
+    near_b[at] = floatBitsToUint(t.lrb.yz);
 }
 
-float kernel(int i) {
-    ivec2 d = neighbour(i);
-    return d.x == 0 || d.y == 0 ? 0.125 : 0.0625;
+Texel kept(int at) {
+    uvec4 a = near_a[at];
+    vec3 normal = vec3(unpackHalf2x16(a.y), unpackHalf2x16(a.z).x);
+    vec3 lrb = vec3(uintBitsToFloat(a.w), uintBitsToFloat(near_b[at]));
+    return Texel(uintBitsToFloat(a.x), normal, uintBitsToFloat(a.z & 0xffff0000u), lrb);
+}
+
+vec3 colour_of(vec3 lrb) {
+    return vec3(lrb.y, (lrb.x - 0.2126 * lrb.y - 0.0722 * lrb.z) / 0.7152, lrb.z);
 }
 
 uvec4 load(ivec2 p) {
-    return (level & 1u) == 0 ? imageLoad(filter_a, p) : imageLoad(filter_b, p);
+    return (LEVEL & 1) == 0 ? imageLoad(filter_a, p) : imageLoad(filter_b, p);
+}
+
+void store(ivec2 p, vec3 colour, float variance) {
+#ifdef SECONDARY
+    if (LEVEL + 1 >= FC.secondary_levels) {
+        imageStore(image_secondary, p, vec4(colour, 0.0));
+        return;
+    }
+#endif
+    uvec4 result = pack_colour(colour, variance);
+    if ((LEVEL & 1) == 0) imageStore(filter_b, p, result);
+    else imageStore(filter_a, p, result);
+}
+
+// What the next frame starts from.
+void store_history(ivec2 p, vec3 colour) {
+    imageStore(channel_now, p, pack_colour(colour, 0.0));
+}
+
+// Column and row of the image where a group begins.
+ivec2 corner_of_group() {
+    ivec2 group = ivec2(gl_WorkGroupID.xy);
+    return ivec2(group.x * WIDTH, (group.y / STEP) * (ROWS * STEP) + group.y % STEP);
+}
+
+// Whether something branches off in a pixel that the group makes.
+bool branches_in_group(ivec2 corner) {
+    const int ROWS_OF_TILES = STEP + 1;
+    if (gl_LocalInvocationIndex == 0) group_branches = false;
+    barrier();
+    ivec2 tile = corner / 8 + ivec2(gl_LocalInvocationIndex % 4, gl_LocalInvocationIndex / 4);
+    if (gl_LocalInvocationIndex < 4 * ROWS_OF_TILES && tile_branches(tile)) group_branches = true;
+    barrier();
+    return group_branches;
+}
+
+ivec2 place_of(ivec2 corner, int i) {
+    return corner + ivec2(i % READ_WIDTH - STEP, (i / READ_WIDTH - 1) * STEP);
+}
+
+Texel unpacked(uvec4 guide_words, uvec4 colour_words) {
+    Guide g = unpack_guide(guide_words);
+    vec4 colour = unpack_colour(colour_words);
+    float l = luminance(colour.rgb);
+    // No two computations of the same give quite the same.
+    return Texel(g.depth, g.normal, SQUARED * colour.a + 1e-8 * l * l + 1e-12, vec3(l, colour.r, colour.b));
+}
+
+// Most pixels that a thread reads: those of level 4.
+const int MOST_READ = (WIDTH + 32) * (ROWS + 2) / 128;
+
+void read_all(ivec2 corner) {
+    // Everything is asked for at once: what this waits for is memory.
+    uvec4 guides[MOST_READ];
+    uvec4 colours[MOST_READ];
+    int lane = int(gl_LocalInvocationIndex);
+    ivec2 last = ivec2(FC.size) - 1;
+    [[unroll]] for (int k = 0; k < MOST_READ; k++) {
+        if (k * 128 >= READ) break;
+        ivec2 p = clamp(place_of(corner, lane + k * 128), ivec2(0), last);
+        guides[k] = imageLoad(channel_guide, p);
+        colours[k] = load(p);
+    }
+    [[unroll]] for (int k = 0; k < MOST_READ; k++) {
+        if (k * 128 >= READ) break;
+        int i = lane + k * 128;
+        ivec2 p = place_of(corner, i);
+        Texel t = unpacked(guides[k], colours[k]);
+        if (p != clamp(p, ivec2(0), last)) t.depth = 0.0;
+        if (i < READ) keep(i, t);
+    }
+}
+
+// The pixel that is filtered.
+struct Centre {
+    Texel own;
+    // The ray through it at depth 1, without its third component, which is 1.
+    vec2 ray;
+    // The normal's part along the ray, and what it is at a step to the right and down.
+    float facing;
+    vec2 aside;
+    vec3 change;
+    float weights;
+    float variance;
+};
+
+// Units at depth 1 from a pixel to the one a step to the right and down.
+vec2 step_aside() {
+    return vec2(2.0 * FC.half_width, -2.0 * FC.half_height) / vec2(FC.size) * float(STEP);
+}
+
+Centre centre_of(Texel own, ivec2 p) {
+    vec2 ray = view_point(vec2(p) + jitter_now(), 1.0).xy;
+    return Centre(own, ray, dot(own.normal.xy, ray) + own.normal.z, own.normal.xy * step_aside(), vec3(0.0), 0.0, 0.0);
+}
+
+// How much of the difference to the pixel so many steps away is taken: the same seen from there.
+float weight_of(Centre c, Texel other, int x, int y) {
+    // Each pixel's distance off the other's plane.
+    vec2 aside = step_aside();
+    float deeper = other.depth - c.own.depth;
+    float between = c.facing * deeper + (float(x) * c.aside.x + float(y) * c.aside.y) * other.depth;
+    float facing = dot(other.normal.xy, c.ray) + other.normal.z;
+    float back = facing * deeper + (float(x) * aside.x * other.normal.x + float(y) * aside.y * other.normal.y) * other.depth;
+    float off = max(abs(between), abs(back));
+    float nearer = min(c.own.depth, other.depth);
+    float unlike = abs(c.own.lrb.x - other.lrb.x) * inversesqrt(c.own.deviation + other.deviation)
+                 + off * (LOG2_E / SIGMA_PLANE / aside.x) / nearer
+                 + LOG2_E * NORMAL_FALL * max(1.0 - dot(c.own.normal, other.normal), 0.0);
+    float kernel = x == 0 || y == 0 ? 0.125 : 0.0625;
+    // One level of the secondary channel always runs: it brings the result to its place.
+    if (IS_SECONDARY && FC.secondary_levels == 0) kernel = 0.0;
+    return nearer > 0.0 ? kernel * exp2(-unlike) : 0.0;
+}
+
+void take(inout Centre c, Texel other, float weight) {
+    c.change += weight * (other.lrb - c.own.lrb);
+    c.weights += weight;
+    c.variance += weight * weight * other.deviation;
+}
+
+void finish(Centre c, ivec2 p) {
+    if (any(greaterThanEqual(p, ivec2(FC.size)))) return;
+    if (c.own.depth <= 0.0) {
+        if (IS_SECONDARY) return;
+        store(p, vec3(0.0), 0.0);
+        if (LEVEL == 0) store_history(p, vec3(0.0));
+        return;
+    }
+    float rest = 1.0 - c.weights;
+    vec3 filtered = colour_of(c.own.lrb + c.change);
+    store(p, filtered, (rest * rest * c.own.deviation + c.variance) / SQUARED);
+    if (LEVEL == 0) {
+        // The next frame starts from this, less and less so the more frames there are: filtering the same history again and
+        // again would spread it ever farther.
+        float frames = imageLoad(channel_moments_now, p).z;
+        float part = min(FED_BACK / max(frames, 1.0), 1.0);
+        store_history(p, mix(colour_of(c.own.lrb), filtered, part * part));
+    }
 }
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, FC.size))) return;
-    ivec2 p = ivec2(pixel);
-    // Everything is asked for at once: the time goes into waiting for memory.
-    uvec4 guides[TAPS];
-    uvec4 colours[TAPS];
-    ivec2 last = ivec2(FC.size) - 1;
-    [[unroll]] for (int i = 0; i < TAPS; i++) {
-        ivec2 q = clamp(p + neighbour(i), ivec2(0), last);
-        guides[i] = imageLoad(guide, q);
-        colours[i] = load(q);
-    }
-    uvec4 packed_ = load(p);
-    Guide g = unpack_guide(imageLoad(guide, p));
-    uvec4 result = packed_;
-    if (g.depth > 0.0) {
-        vec4 own = unpack_colour(packed_);
-        float l = luminance(own.rgb);
-        // The ray through this pixel at depth 1, what it changes by from pixel to pixel, and the plane that it meets.
-        vec3 ray = view_point(vec2(p) + jitter_now(), 1.0);
-        vec2 per_pixel = vec2(2.0 * FC.half_width, -2.0 * FC.half_height) / vec2(FC.size);
-        float facing = dot(g.normal, ray);
-        float off_scale = 1.0 / (SIGMA_PLANE * per_pixel.x * float(1u << level));
-        vec3 change = vec3(0.0);
-        float weights = 0.0;
-        float variance = 0.0;
-        [[unroll]] for (int i = 0; i < TAPS; i++) {
-            ivec2 q = p + neighbour(i);
-            Guide other = unpack_guide(guides[i]);
-            vec4 theirs = unpack_colour(colours[i]);
-            float their_l = luminance(theirs.rgb);
-            // Each pixel's distance off the other's plane.
-            vec2 aside = per_pixel * vec2(neighbour(i));
-            float between = facing * (other.depth - g.depth) + dot(g.normal.xy, aside) * other.depth;
-            float back = dot(other.normal, ray) * (other.depth - g.depth) + dot(other.normal.xy, aside) * other.depth;
-            float off = max(abs(between), abs(back));
-            float deviation = SIGMA_LUMINANCE * sqrt(own.a + theirs.a) + 1e-6 + 1e-4 * (l + their_l);
-            float unlike = abs(l - their_l) / deviation + off * off_scale / min(g.depth, other.depth)
-                         + NORMAL_FALL * (1.0 - dot(g.normal, other.normal));
-            bool counts = other.depth > 0.0 && q == clamp(q, ivec2(0), last);
-            float weight = counts ? kernel(i) * exp(-unlike) : 0.0;
-            change += weight * (theirs.rgb - own.rgb);
-            weights += weight;
-            variance += weight * weight * theirs.a;
+    ivec2 corner = corner_of_group();
+    if (IS_SECONDARY && !branches_in_group(corner)) return;
+    read_all(corner);
+    barrier();
+    // Two pixels, one a step below the other, of the same pixels around them.
+    int column = int(gl_LocalInvocationID.x);
+    int row = 2 * int(gl_LocalInvocationID.y);
+    ivec2 p = corner + ivec2(column, row * STEP);
+    ivec2 q = p + ivec2(0, STEP);
+    int at = (row + 1) * READ_WIDTH + column + STEP;
+    Centre upper = centre_of(kept(at), p);
+    Centre lower = centre_of(kept(at + READ_WIDTH), q);
+    float shared_ = weight_of(upper, lower.own, 0, 1);
+    take(upper, lower.own, shared_);
+    take(lower, upper.own, shared_);
+    [[unroll]] for (int y = -1; y <= 2; y++) {
+        [[unroll]] for (int x = -1; x <= 1; x++) {
+            if (x == 0 && (y == 0 || y == 1)) continue;
+            Texel other = kept(at + y * READ_WIDTH + x * STEP);
+            if (y <= 1) take(upper, other, weight_of(upper, other, x, y));
+            if (y >= 0) take(lower, other, weight_of(lower, other, x, y - 1));
         }
-        result = pack_colour(own.rgb + change, (1.0 - weights) * (1.0 - weights) * own.a + variance);
     }
-    if ((level & 1u) == 0) imageStore(filter_b, p, result);
-    else imageStore(filter_a, p, result);
-    if (level == 0) {
-        // The next frame starts from this, less and less so the more frames there are: filtering the same history again and
-        // again would spread it ever farther.
-        float part = min(FED_BACK / max(imageLoad(moments_now, p).z, 1.0), 1.0);
-        part *= part;
-        vec4 filtered = unpack_colour(result);
-        vec4 own = unpack_colour(packed_);
-        imageStore(irradiance_now, p, pack_colour(mix(own.rgb, filtered.rgb, part), 0.0));
-    }
+    finish(upper, p);
+    finish(lower, q);
 }

@@ -36,6 +36,7 @@ void main() {
     if (FC.illumination == 0 && albedo.rgb != vec3(0.0)) emission = vec3(0.0);
     vec3 share = imageLoad(image_share, p).rgb;
     vec3 layers = imageLoad(image_layers, p).rgb;
+    if (FC.branches_off != 0) layers += imageLoad(image_secondary, p).rgb;
     direct *= share;
     emission *= share;
     vec3 radiance = direct + emission + layers;

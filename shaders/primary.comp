@@ -2,6 +2,7 @@
 // Primary stage: camera rays to the G-buffer.
 #extension GL_GOOGLE_include_directive : require
 #define TRACE_LAYERS
+#define NOTES_INTERFACE
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"
@@ -9,9 +10,10 @@
 #include "surface.glsl"
 #include "camera.glsl"
 #include "gbuffer.glsl"
+#include "guide.glsl"
 #include "layers.glsl"
 #include "deform.glsl"
-#include "guide.glsl"
+#include "secondary_tiles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -33,12 +35,20 @@ vec3 old_position_of(Instance i, Hit hit) {
 shared uint group_pixels;
 shared uint group_first;
 
+// Whether a pixel of the work group shows a surface that something branches off at, or may.
+shared uint group_interfaces;
+
 // Lists a pixel for the secondary stage. To be called by every thread of the group.
 void list_pixel(uvec2 pixel, bool branches) {
-    if (gl_LocalInvocationIndex == 0) group_pixels = 0;
+    if (gl_LocalInvocationIndex == 0) {
+        group_pixels = 0;
+        group_interfaces = 0;
+    }
     barrier();
     uint place = branches ? atomicAdd(group_pixels, 1) : 0;
+    if (interface_guide != uvec4(0)) group_interfaces = 1;
     barrier();
+    if (gl_LocalInvocationIndex == 0) FC.secondary_pixels.at[tile_place(ivec2(gl_WorkGroupID.xy))] = group_interfaces;
     if (gl_LocalInvocationIndex == 0 && group_pixels != 0) {
         group_first = atomicAdd(FC.secondary_pixels.count, group_pixels);
         atomicMax(FC.secondary_pixels.groups[0], (group_first + group_pixels + 63) / 64);
@@ -54,7 +64,10 @@ bool shoot(uvec2 pixel) {
     camera_ray(pixel, sample_index, origin, direction);
     Seen seen = see(Path(origin, direction, vec3(1.0), 0.0, 0, pixel.x + (pixel.y << 16), -1.0, 0, 0));
     bool branches = branch_count != 0;
-    if (FC.view == 23) imageStore(image_secondary, p, vec4(0.0));
+    if (FC.branches_off != 0) {
+        imageStore(image_secondary, p, vec4(0.0));
+        imageStore(secondary_guide, p, interface_guide);
+    }
     Hit hit = seen.hit;
     imageStore(gbuffer_view, p, vec4(direction, 0.0));
     imageStore(image_layers, p, vec4(seen.layers, 0.0));

@@ -25,7 +25,11 @@
 
 layout(local_size_x = 64) in;
 
-vec3 branches_of(uvec2 pixel, inout uvec2 counts) {
+// How far away a sky is, units.
+const float SKY = 1e6;
+
+// Radiance of all that branches off the eye ray of a pixel, and how long the way of the brightest branch is.
+vec4 branches_of(uvec2 pixel, inout uvec2 counts) {
     vec3 radiance = vec3(0.0);
     Path path;
     path.share = vec3(1.0);
@@ -37,8 +41,17 @@ vec3 branches_of(uvec2 pixel, inout uvec2 counts) {
     path.place = 0;
     camera_ray(pixel, sample_index, path.origin, path.direction);
     bool eye = true;
+    float most = 0.0;
+    float way = 0.0;
     [[dont_unroll]] while (true) {
+        float before = path.travelled;
+        float share = luminance(path.share);
         Seen seen = see(path);
+        if (!eye && share > most) {
+            most = share;
+            bool sky = seen.hit.triangle == NONE || (FC.materials.at[seen.surface.material].flags & MATERIAL_SKY) != 0;
+            way = sky ? SKY : max(seen.distance - before, 1e-3);
+        }
         if (!eye) radiance += seen.layers + seen.share * seen.emission;
         bool diffuse = !eye && seen.hit.triangle != NONE && seen.surface.albedo != vec3(0.0);
         if (diffuse || seen.glossy) {
@@ -57,7 +70,7 @@ vec3 branches_of(uvec2 pixel, inout uvec2 counts) {
         path = branch_stack[--branch_top];
         eye = false;
     }
-    return radiance;
+    return vec4(radiance, way);
 }
 
 void main() {
@@ -68,12 +81,10 @@ void main() {
     if (i < FC.secondary_pixels.count) {
         uint address = FC.secondary_pixels.at[i];
         uvec2 pixel = uvec2(address & 0xffffu, address >> 16);
-        vec3 radiance = branches_of(pixel, counts);
+        vec4 radiance = branches_of(pixel, counts);
         // A value that is not finite would stay in every history it enters.
-        if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
-        ivec2 p = ivec2(pixel);
-        imageStore(image_layers, p, vec4(imageLoad(image_layers, p).rgb + radiance, 0.0));
-        if (FC.view == 23) imageStore(image_secondary, p, vec4(radiance, 0.0));
+        if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec4(0.0);
+        imageStore(image_secondary, ivec2(pixel), radiance);
     }
     end_counting(counts);
 }

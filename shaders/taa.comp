@@ -1,8 +1,8 @@
 #version 460
 // Temporal anti-aliasing: the composed radiance, one place in each pixel per frame, blended with that of frames before.
 //
-// Linear light, weighted by 1/(1 + Y·exposure) so that bright edges do not win (Karis 2014); history is fetched with a
-// Catmull-Rom filter along the motion of the nearest surface around, and held to the mean ± γ standard deviations of the
+// Linear light, weighted by 1/(1 + Y·exposure) so that bright edges do not win (Karis 2014); history is fetched with a cubic
+// filter along the motion of the surface, at edges of the nearest one around, and held to the mean ± γ standard deviations of the
 // pixel's surroundings in YCoCg (Salvi 2016). While view and scene stand still nothing is held back, and the result is the
 // mean over the pixel.
 #extension GL_GOOGLE_include_directive : require
@@ -11,9 +11,12 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Least weight of a new frame, and while everything stands still.
+// Least weight of a new frame, where the history lies on pixels, halfway between them, and while everything stands still.
 const float LEAST_WEIGHT = 0.1;
+const float LEAST_BETWEEN = 0.5;
 const float LEAST_STILL = 1.0 / 256.0;
+// Farther away than so many times as far as a neighbour, and units, a pixel lies behind an edge.
+const vec2 EDGE_DEPTHS = vec2(1.1, 1.0);
 
 vec3 to_ycocg(vec3 c) {
     return vec3(dot(c, vec3(0.25, 0.5, 0.25)), dot(c, vec3(0.5, 0.0, -0.5)), dot(c, vec3(-0.25, 0.5, -0.25)));
@@ -39,87 +42,112 @@ vec3 expand(vec3 y, float e) {
     return from_ycocg(y / max(1.0 - y.x * e, 1e-6));
 }
 
+// Sharper than Catmull and Rom's, whose third number is −0.5: what is fetched again and again is blurred each time.
+const float CUBIC = -0.75;
+
 vec4 weights_of(float t) {
     float t2 = t * t;
     float t3 = t2 * t;
-    return vec4(-0.5 * t3 + t2 - 0.5 * t, 1.5 * t3 - 2.5 * t2 + 1.0, -1.5 * t3 + 2.0 * t2 + 0.5 * t, 0.5 * t3 - 0.5 * t2);
+    return vec4(CUBIC * (t3 - 2.0 * t2 + t), (CUBIC + 2.0) * t3 - (CUBIC + 3.0) * t2 + 1.0,
+                -(CUBIC + 2.0) * t3 + (2.0 * CUBIC + 3.0) * t2 - CUBIC * t, CUBIC * (t2 - t3));
 }
 
-// History at a place (pixel centres are whole numbers), compressed: Catmull-Rom, held to the range of the four nearest.
-vec4 history_at(vec2 place, float e) {
+// Radiance that the history shows at a place (pixel centres are whole numbers), and its frames: a cubic filter without its four
+// corners, whose weights are next to nothing.
+vec4 history_at(vec2 place) {
     ivec2 first = ivec2(floor(place));
     vec2 part = place - vec2(first);
     vec4 wx = weights_of(part.x);
     vec4 wy = weights_of(part.y);
+    ivec2 last = ivec2(FC.size) - 1;
     vec3 sum = vec3(0.0);
-    vec3 low = vec3(1e30);
-    vec3 high = vec3(-1e30);
+    float weights = 0.0;
     float frames = 1e9;
-    for (int y = 0; y < 4; y++) {
-        for (int x = 0; x < 4; x++) {
-            ivec2 q = clamp(first + ivec2(x - 1, y - 1), ivec2(0), ivec2(FC.size) - 1);
-            vec4 h = imageLoad(taa_before, q);
-            vec3 c = compress(h.rgb, e);
-            sum += c * (wx[x] * wy[y]);
-            if (x > 0 && x < 3 && y > 0 && y < 3) {
-                frames = min(frames, h.a);
-                low = min(low, c);
-                high = max(high, c);
-            }
+    [[unroll]] for (int y = 0; y < 4; y++) {
+        [[unroll]] for (int x = 0; x < 4; x++) {
+            if ((x == 0 || x == 3) && (y == 0 || y == 3)) continue;
+            vec4 h = imageLoad(taa_before, clamp(first + ivec2(x - 1, y - 1), ivec2(0), last));
+            sum += h.rgb * (wx[x] * wy[y]);
+            weights += wx[x] * wy[y];
+            if (x > 0 && x < 3 && y > 0 && y < 3) frames = min(frames, h.a);
         }
     }
-    return vec4(clamp(sum, low, high), frames);
+    return vec4(max(sum / weights, vec3(0.0)), frames);
 }
 
-void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, FC.size))) return;
-    ivec2 p = ivec2(pixel);
-    vec3 own = imageLoad(image_composite, p).rgb;
-    if (any(isnan(own)) || any(isinf(own))) own = vec3(0.0);
-    if (FC.history == 0) {
-        imageStore(taa_now, p, vec4(own, 1.0));
-        return;
+// What the work group and the pixels around it show, compressed, and how far away; 0 where nothing is met.
+const int EDGE = 10;
+shared vec4 around[EDGE * EDGE];
+
+void read_around(ivec2 corner, float e) {
+    for (int i = int(gl_LocalInvocationIndex); i < EDGE * EDGE; i += 64) {
+        ivec2 q = clamp(corner + ivec2(i % EDGE, i / EDGE) - 1, ivec2(0), ivec2(FC.size) - 1);
+        vec3 c = compress(imageLoad(image_composite, q).rgb, e);
+        if (any(isnan(c)) || any(isinf(c))) c = vec3(0.0);
+        around[i] = vec4(c, imageLoad(gbuffer_motion, q).z);
     }
-    if (FC.still != 0) {
-        vec4 before = imageLoad(taa_before, p);
-        float frames = before.a + 1.0;
-        // Weights grow with the frame's number: early ones were denoised from fewer samples.
-        imageStore(taa_now, p, vec4(mix(before.rgb, own, max(2.0 / (frames + 1.0), LEAST_STILL)), frames));
-        return;
-    }
-    float e = exposure();
+}
+
+vec4 blended(ivec2 p, vec3 own, float e) {
+    int centre = (int(gl_LocalInvocationID.y) + 1) * EDGE + int(gl_LocalInvocationID.x) + 1;
     vec3 mean = vec3(0.0);
     vec3 square = vec3(0.0);
     float brightest = 0.0;
     float nearest = 1e30;
-    vec2 motion = imageLoad(gbuffer_motion, p).xy;
-    for (int i = 0; i < 9; i++) {
-        ivec2 q = clamp(p + ivec2(i % 3 - 1, i / 3 - 1), ivec2(0), ivec2(FC.size) - 1);
-        vec3 c = compress(imageLoad(image_composite, q).rgb, e);
-        if (any(isnan(c)) || any(isinf(c))) c = vec3(0.0);
-        mean += c / 9.0;
-        square += c * c / 9.0;
-        brightest = max(brightest, c.x);
-        vec3 m = imageLoad(gbuffer_motion, q).xyz;
-        if (m.z > 0.0 && m.z < nearest) {
-            nearest = m.z;
-            motion = m.xy;
+    ivec2 nearest_at = ivec2(0);
+    [[unroll]] for (int y = -1; y <= 1; y++) {
+        [[unroll]] for (int x = -1; x <= 1; x++) {
+            vec4 c = around[centre + y * EDGE + x];
+            mean += c.rgb / 9.0;
+            square += c.rgb * c.rgb / 9.0;
+            brightest = max(brightest, c.x);
+            if (c.w > 0.0 && c.w < nearest) {
+                nearest = c.w;
+                nearest_at = ivec2(x, y);
+            }
         }
     }
-    vec2 place = vec2(p) + motion;
+    // On the surface itself every pixel moves by its own: to take its neighbour's would shift it a little in each frame.
+    float own_depth = around[centre].w;
+    if (own_depth > 0.0 && own_depth < nearest * EDGE_DEPTHS.x + EDGE_DEPTHS.y) nearest_at = ivec2(0);
+    ivec2 q = clamp(p + nearest_at, ivec2(0), ivec2(FC.size) - 1);
+    vec2 place = vec2(p) + imageLoad(gbuffer_motion, q).xy;
+    if (!(all(greaterThan(place, vec2(-0.5))) && all(lessThan(place, vec2(FC.size) - 0.5)))) return vec4(own, 1.0);
+    vec4 before = history_at(place);
+    vec3 reach = FC.taa_gamma * sqrt(max(square - mean * mean, vec3(0.0)));
+    vec3 held = clamp(compress(before.rgb, e), mean - reach, mean + reach);
+    held.x = min(held.x, brightest);
+    // What is fetched from between pixels is blurred: it counts the less.
+    vec2 off = place - round(place);
+    float between = 2.0 * max(abs(off.x), abs(off.y));
+    float frames = min(before.a + 1.0, 1.0 / mix(LEAST_WEIGHT, LEAST_BETWEEN, between));
+    // Linear light, each weighted by what compression leaves of it (Karis 2014).
+    vec3 old = max(expand(held, e), vec3(0.0));
+    float old_weight = (1.0 - 1.0 / frames) / (1.0 + to_ycocg(old).x * e);
+    float own_weight = (1.0 / frames) / (1.0 + to_ycocg(own).x * e);
+    return vec4((old * old_weight + own * own_weight) / (old_weight + own_weight), frames);
+}
+
+void main() {
+    ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+    bool inside = all(lessThan(gl_GlobalInvocationID.xy, FC.size));
+    bool blends = FC.history != 0 && FC.still == 0;
+    float e = exposure();
+    if (blends) {
+        read_around(ivec2(gl_WorkGroupID.xy) * 8, e);
+        barrier();
+    }
+    if (!inside) return;
+    vec3 own = imageLoad(image_composite, p).rgb;
+    if (any(isnan(own)) || any(isinf(own))) own = vec3(0.0);
     vec4 result = vec4(own, 1.0);
-    if (all(greaterThan(place, vec2(-0.5))) && all(lessThan(place, vec2(FC.size) - 0.5))) {
-        vec4 before = history_at(place, e);
-        vec3 reach = FC.taa_gamma * sqrt(max(square - mean * mean, vec3(0.0)));
-        vec3 held = clamp(before.rgb, mean - reach, mean + reach);
-        held.x = min(held.x, brightest);
-        float frames = min(before.a + 1.0, 1.0 / LEAST_WEIGHT);
-        // Linear light, each weighted by what compression leaves of it (Karis 2014).
-        vec3 old = max(expand(held, e), vec3(0.0));
-        float old_weight = (1.0 - 1.0 / frames) / (1.0 + to_ycocg(old).x * e);
-        float own_weight = (1.0 / frames) / (1.0 + to_ycocg(own).x * e);
-        result = vec4((old * old_weight + own * own_weight) / (old_weight + own_weight), frames);
+    if (blends) {
+        result = blended(p, own, e);
+    } else if (FC.history != 0) {
+        vec4 before = imageLoad(taa_before, p);
+        float frames = before.a + 1.0;
+        // Weights grow with the frame's number: early ones were denoised from fewer samples.
+        result = vec4(mix(before.rgb, own, max(2.0 / (frames + 1.0), LEAST_STILL)), frames);
     }
     imageStore(taa_now, p, result);
 }

@@ -1,18 +1,21 @@
 #version 460
 // Temporal stage of the denoiser (A-SVGF: Schied, Peters and Dachsbacher 2018; SVGF: Schied et al. 2017, section 4.1 and 4.2):
 // irradiance and moments of its luminance blended with those of the same surface in the frame before, and the variance of the
-// result.
+// result. Light that branches off (SECONDARY) is a signal of its own: radiance, held together by the surface that it branches off at, and
+// moving as what is seen in that surface does.
 //
 // The weight of the new frame is the inverse of the number of frames, but not less than `rt_leastAlpha`; where the gradient
 // says that the light has changed, it rises to 1 and the number of frames shrinks with it.
 #extension GL_GOOGLE_include_directive : require
 #include "prelude.glsl"
 #include "gbuffer.glsl"
+#include "channel.glsl"
 #include "camera_motion.glsl"
 #include "guide.glsl"
 #include "luminance.glsl"
 #include "packed.glsl"
 #include "gradient.glsl"
+#include "secondary_tiles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -23,6 +26,8 @@ const float LEAST_COSINE = 0.9;
 // With fewer frames the variance is estimated over the surroundings.
 const float FEW_FRAMES = 4.0;
 const int SURROUNDINGS = 3;
+// How many standard errors the light that branches off may differ from its surroundings' where the scene has changed.
+const float LAG = 3.0;
 
 struct Past {
     vec3 irradiance;
@@ -32,22 +37,61 @@ struct Past {
     float frames;
 };
 
+Guide guide_at(ivec2 p) {
+    return unpack_guide(imageLoad(channel_guide, p));
+}
+
+vec3 sample_at(ivec2 p) {
+    return imageLoad(channel_sample, p).rgb;
+}
+
+vec4 old_moments_at(ivec2 p) {
+    vec4 m = imageLoad(channel_moments_before, p);
+    if (IS_SECONDARY) m.y *= m.y;
+    return m;
+}
+
+void store_moments(ivec2 p, vec4 m) {
+    // Half precision, which the secondary channel has, ends at 65504.
+    if (IS_SECONDARY) m.xy = min(vec2(m.x, sqrt(m.y)), vec2(6e4));
+    imageStore(channel_moments_now, p, m);
+}
+
+void store_result(ivec2 p, uvec4 result) {
+    imageStore(filter_a, p, result);
+    // Where the filter has levels, the first one's result is what the next frame starts from.
+    if (!IS_SECONDARY && FC.filter_levels == 0) imageStore(channel_now, p, result);
+}
+
 // `at` and `normal`: the surface along the axes of the view before.
 bool same_surface(ivec2 q, uint id, vec3 at, vec3 normal) {
     if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(FC.size)))) return false;
-    Guide other = unpack_guide(imageLoad(old_guide, q));
+    Guide other = unpack_guide(imageLoad(channel_old_guide, q));
     if (other.depth <= 0.0 || other.id != id || dot(other.normal, normal) < LEAST_COSINE) return false;
     vec3 there = old_view_point(vec2(q) + jitter_before(), other.depth);
     return abs(dot(there - at, normal)) < OFF_PLANE.x * at.z + OFF_PLANE.y;
 }
 
 void add(inout Past past, inout float weights, ivec2 q, float weight) {
-    vec4 moments = imageLoad(moments_before, q);
-    past.irradiance += unpack_colour(imageLoad(irradiance_before, q)).rgb * weight;
+    vec4 moments = old_moments_at(q);
+    uvec4 colour = imageLoad(channel_before, q);
+    past.irradiance += unpack_colour(colour).rgb * weight;
     past.share += moments.w * weight;
     past.moments += moments.xy * weight;
     past.frames += moments.z * weight;
     weights += weight;
+}
+
+// Length of the way that what branches off at a pixel goes to the next surface, units: its own or the longest one near it, since in a
+// frame not all pixels follow what branches off; 0 where none does.
+float way_of(ivec2 p) {
+    float own = imageLoad(channel_sample, p).a;
+    if (own > 0.0) return own;
+    for (int i = 0; i < 16; i++) {
+        ivec2 q = clamp(p + 2 * ivec2(i & 3, i >> 2) - 3, ivec2(0), ivec2(FC.size) - 1);
+        own = max(own, imageLoad(channel_sample, q).a);
+    }
+    return own;
 }
 
 // What the surface of a pixel had in the frame before; no frames where it was not seen.
@@ -57,10 +101,13 @@ Past past_of(ivec2 p, Guide g) {
     // From the depth rather than the G-buffer's position and motion: memory is what bounds this pass.
     vec3 here = view_point(vec2(p) + jitter_now(), g.depth);
     vec3 point = FC.eye + FC.right * here.x + FC.up * here.y + FC.forward * here.z;
-    vec2 motion = FC.still != 0 ? vec2(0.0) : motion_of(point);
+    // Reflected in a plane, things move as their images behind it do.
+    vec3 shown = point;
+    if (IS_SECONDARY && FC.still == 0) shown += (point - FC.eye) * (way_of(p) / length(here));
+    vec2 motion = FC.still != 0 ? vec2(0.0) : motion_of(shown);
     if (abs(motion.x) > float(FC.size.x) || abs(motion.y) > float(FC.size.y)) return past;
     vec3 at = to_old_view(point - FC.old_eye);
-    if (FC.moving != 0) {
+    if (!IS_SECONDARY && FC.moving != 0) {
         vec4 m = imageLoad(gbuffer_motion, p);
         motion = m.xy;
         vec2 s = (vec2(p) + jitter_now() + motion) / vec2(FC.size) * 2.0 - 1.0;
@@ -96,36 +143,53 @@ vec3 surroundings(ivec2 p, Guide g, int reach, bool itself) {
     vec3 at = view_point(vec2(p) + jitter_now(), g.depth);
     vec3 normal = g.normal;
     vec3 sum = vec3(0.0);
-    [[dont_unroll]] for (int y = -reach; y <= reach; y++) {
-        [[dont_unroll]] for (int x = -reach; x <= reach; x++) {
+    // Of what branches off every other pixel is enough: it is asked for wherever the scene changes.
+    const int EACH = IS_SECONDARY ? 2 : 1;
+    [[dont_unroll]] for (int y = -reach; y <= reach; y += EACH) {
+        [[dont_unroll]] for (int x = -reach; x <= reach; x += EACH) {
             ivec2 q = p + ivec2(x, y);
             if (!itself && q == p) continue;
             if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(FC.size)))) continue;
-            Guide other = unpack_guide(imageLoad(guide, q));
+            Guide other = guide_at(q);
             if (other.depth <= 0.0 || dot(other.normal, g.normal) < LEAST_COSINE) continue;
             vec3 there = view_point(vec2(q) + jitter_now(), other.depth);
             if (abs(dot(there - at, normal)) > OFF_PLANE.x * at.z + OFF_PLANE.y) continue;
-            float l = luminance(imageLoad(image_direct, q).rgb);
+            float l = luminance(sample_at(q));
             sum += vec3(l, l * l, 1.0);
         }
     }
     return sum;
 }
 
+// How much the light at a pixel has changed since the frame before, 0..1.
+float change_at(ivec2 p, Guide g, Past past) {
+    if (!IS_SECONDARY) return gradient_at(p);
+    if (FC.changed == 0 || past.frames <= 0.0) return 0.0;
+    // No sample of the frame before is taken again here: what the surroundings show now has to do.
+    vec3 around = surroundings(p, g, SURROUNDINGS, true);
+    vec2 mean = around.xy / max(around.z, 1.0);
+    float error = sqrt(max(mean.y - mean.x * mean.x, 0.0) / max(around.z, 1.0));
+    float before = luminance(past.irradiance);
+    float off = abs(before - mean.x) - LAG * error;
+    return off > 0.0 ? clamp(off / max(before, mean.x), 0.0, 1.0) : 0.0;
+}
+
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(pixel, FC.size))) return;
     ivec2 p = ivec2(pixel);
-    Guide g = unpack_guide(imageLoad(guide, p));
-    vec3 sampled = imageLoad(image_direct, p).rgb;
-    // History keeps what it is given for ever.
-    if (any(isnan(sampled)) || any(isinf(sampled))) sampled = vec3(0.0);
+    if (IS_SECONDARY && !tile_branches(p / 8)) return;
+    Guide g = guide_at(p);
     if (g.depth <= 0.0) {
-        imageStore(filter_a, p, uvec4(0));
-        imageStore(moments_now, p, vec4(0.0, 0.0, 0.0, 1.0));
-        if (FC.filter_levels == 0) imageStore(irradiance_now, p, uvec4(0));
+        // Nothing of the other channel is read where its guide is empty.
+        if (IS_SECONDARY) return;
+        store_result(p, uvec4(0));
+        store_moments(p, vec4(0.0, 0.0, 0.0, 1.0));
         return;
     }
+    vec3 sampled = sample_at(p);
+    // History keeps what it is given for ever.
+    if (any(isnan(sampled)) || any(isinf(sampled))) sampled = vec3(0.0);
     if (FC.fireflies > 0.0) {
         // Without the sample itself, which would raise the bound that it is held against.
         vec3 around = surroundings(p, g, SURROUNDINGS, false);
@@ -136,7 +200,7 @@ void main() {
     }
     float l = luminance(sampled);
     Past past = past_of(p, g);
-    float change = gradient_at(p);
+    float change = change_at(p, g, past);
     float frames = past.frames * (1.0 - change) + 1.0;
     float alpha = past.frames <= 0.0 ? 1.0 : mix(max(1.0 / frames, FC.least_alpha), 1.0, change);
     vec3 irradiance = mix(past.irradiance, sampled, alpha);
@@ -148,14 +212,11 @@ void main() {
         vec2 mean = around.xy / max(around.z, 1.0);
         variance = max(variance, max(mean.y - mean.x * mean.x, 0.0));
     }
-    uvec4 result = pack_colour(irradiance, variance * share);
-    imageStore(filter_a, p, result);
-    imageStore(moments_now, p, vec4(moments, frames, share));
+    store_result(p, pack_colour(irradiance, variance * share));
+    store_moments(p, vec4(moments, frames, share));
     // A pixel of each 16 x 16 tells for all of them how long their history is.
-    if (((p.x | p.y) & 15) == 0) {
+    if (!IS_SECONDARY && ((p.x | p.y) & 15) == 0) {
         atomicAdd(FC.counters.at[4], uint(min(frames, 4096.0)));
         atomicAdd(FC.counters.at[5], 1);
     }
-    // Where the filter has levels, the first one's result is what the next frame starts from.
-    if (FC.filter_levels == 0) imageStore(irradiance_now, p, result);
 }

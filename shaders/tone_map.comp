@@ -19,40 +19,51 @@ vec3 number_colour(uint n) {
     return vec3(h & 255u, (h >> 8) & 255u, (h >> 16) & 255u) / 255.0;
 }
 
+vec3 displayed(vec3 radiance) {
+    float exposure = FC.fixed_exposure > 0.0 ? FC.fixed_exposure : FC.exposure.at[0];
+    if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
+    return encode_srgb(clamp(tone_map(clamp(radiance * exposure, vec3(0.0), vec3(1e4)), FC.tonemap), vec3(0.0), vec3(1.0)));
+}
+
+vec3 final_radiance(ivec2 p) {
+    return accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated) : shown_radiance(p);
+}
+
+// One of the frame's intermediate images.
+vec3 intermediate(ivec2 p) {
+    vec4 filtered = FC.denoised == 0 ? vec4(imageLoad(image_direct, p).rgb, 0.0)
+                                     : unpack_colour(FC.denoised == 2 ? imageLoad(filter_b, p) : imageLoad(filter_a, p));
+    vec4 moments = FC.denoised != 0 ? imageLoad(moments_now, p) : vec4(0.0);
+    vec4 position = imageLoad(gbuffer_position, p);
+    uvec4 surface = imageLoad(gbuffer_surface, p);
+    switch (FC.view) {
+        case 1: return encode_srgb(clamp(imageLoad(gbuffer_albedo, p).rgb, 0.0, 1.0));
+        case 2: return unpack_normal(surface.x) * 0.5 + 0.5;
+        case 3: return unpack_normal(surface.y) * 0.5 + 0.5;
+        case 4: return vec3(position.w / (position.w + 512.0));
+        case 5: return fract(position.xyz / 256.0);
+        case 6: return number_colour(imageLoad(gbuffer_object, p).w);
+        case 7: return number_colour(surface.z);
+        case 8: return displayed(imageLoad(image_direct, p).rgb);
+        case 9: return displayed(imageLoad(image_emission, p).rgb);
+        case 10: return displayed(ambient_at(position.xyz, unpack_normal(surface.x)));
+        case 12: return vec3(moments.z > 0.0 ? mix(max(1.0 / moments.z, FC.least_alpha), 1.0, gradient_at(p)) : 0.0);
+        case 13: return vec3(moments.z / (moments.z + 20.0));
+        case 14: return displayed(vec3(sqrt(filtered.a)));
+        case 15: return displayed(vec3(moments.x, sqrt(moments.y), 0.0));
+        case 16: return vec3(gradient_at(p));
+        case 17: return vec3(imageLoad(gbuffer_motion, p).xy / 32.0 + 0.5, 0.5);
+        case 23: return displayed(imageLoad(image_secondary, p).rgb);
+        // The denoised irradiance, and the levels of the filter: the last one that runs is what is shown.
+        case 11:
+        default: return displayed(filtered.rgb);
+    }
+}
+
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(pixel, FC.size))) return;
     ivec2 p = ivec2(pixel);
-    float exposure = FC.fixed_exposure > 0.0 ? FC.fixed_exposure : FC.exposure.at[0];
-    vec3 radiance = accumulated > 0 ? imageLoad(image_mean, p).rgb / float(accumulated)
-                                    : shown_radiance(p);
-    if (FC.view == 8) radiance = imageLoad(image_direct, p).rgb;
-    if (FC.view == 9) radiance = imageLoad(image_emission, p).rgb;
-    if (FC.view == 10) {
-        radiance = ambient_at(imageLoad(gbuffer_position, p).xyz, unpack_normal(imageLoad(gbuffer_surface, p).x));
-    }
-    if (FC.view == 23) radiance = imageLoad(image_secondary, p).rgb;
-    vec4 moments = FC.denoised != 0 ? imageLoad(moments_now, p) : vec4(0.0);
-    vec4 filtered = FC.denoised == 0 ? vec4(imageLoad(image_direct, p).rgb, 0.0)
-                                     : unpack_colour(FC.denoised == 2 ? imageLoad(filter_b, p) : imageLoad(filter_a, p));
-    if (FC.view == 11 || (FC.view >= 18 && FC.view < 23)) radiance = filtered.rgb;
-    if (FC.view == 14) radiance = vec3(sqrt(filtered.a));
-    if (FC.view == 15) radiance = vec3(moments.x, sqrt(moments.y), 0.0);
-    if (any(isnan(radiance)) || any(isinf(radiance))) radiance = vec3(0.0);
-    vec3 shown = encode_srgb(clamp(tone_map(clamp(radiance * exposure, vec3(0.0), vec3(1e4)), FC.tonemap), vec3(0.0), vec3(1.0)));
-    uvec4 surface = imageLoad(gbuffer_surface, p);
-    uvec4 object = imageLoad(gbuffer_object, p);
-    vec4 position = imageLoad(gbuffer_position, p);
-    if (FC.view == 1) shown = encode_srgb(clamp(imageLoad(gbuffer_albedo, p).rgb, 0.0, 1.0));
-    if (FC.view == 2) shown = unpack_normal(surface.x) * 0.5 + 0.5;
-    if (FC.view == 3) shown = unpack_normal(surface.y) * 0.5 + 0.5;
-    if (FC.view == 4) shown = vec3(position.w / (position.w + 512.0));
-    if (FC.view == 5) shown = fract(position.xyz / 256.0);
-    if (FC.view == 6) shown = number_colour(object.w);
-    if (FC.view == 7) shown = number_colour(surface.z);
-    if (FC.view == 12) shown = vec3(moments.z > 0.0 ? mix(max(1.0 / moments.z, FC.least_alpha), 1.0, gradient_at(p)) : 0.0);
-    if (FC.view == 13) shown = vec3(moments.z / (moments.z + 20.0));
-    if (FC.view == 16) shown = vec3(gradient_at(p));
-    if (FC.view == 17) shown = vec3(imageLoad(gbuffer_motion, p).xy / 32.0 + 0.5, 0.5);
+    vec3 shown = FC.view == 0 ? displayed(final_radiance(p)) : intermediate(p);
     imageStore(image_display, p, vec4(shown, 1.0));
 }

@@ -25,6 +25,8 @@ const SIZE: (u32, u32) = (160, 90);
 fn settings() -> Settings {
     Settings {
         ambient: AmbientLight::Off,
+        // An odd number of levels: the result is in `filter_b`.
+        atrous_levels: 5,
         ..Settings::default()
     }
 }

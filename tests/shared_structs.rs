@@ -388,7 +388,9 @@ fn records() -> Vec<Record> {
             branches_off,
             branch_share,
             guest_count,
-            draw_sun
+            draw_sun,
+            secondary_levels,
+            padding
         }),
         record!(Push {
             frame,

@@ -11,7 +11,7 @@
 // | emission | radiance emitted towards the eye |
 // | share | share of the surface's light that comes through the layers before it |
 // | layers | radiance of those layers |
-// | secondary | radiance of all that branches off: reflections, but for those that the pixel shows alone |
+// | secondary | radiance of all that branches off: reflections, but for those that the pixel shows alone; until it is denoised, length of the brightest branch's way, units, 0 where none was followed |
 // | direct | irradiance/π by direct light, not multiplied with the albedo |
 // | composite | radiance of the pixel |
 // | mean, compensation | accumulated radiance: see accumulate.comp |
@@ -23,6 +23,8 @@
 // | irradiance | history: irradiance/π (packed.glsl) |
 // | moments | history: first and second moment of the luminance; frames; share of one sample's variance that their mean has |
 // | taa | history: radiance; frames |
+// | secondary_guide | as guide, of the first surface that something branches off at |
+// | secondary_radiance, secondary_moments | history of secondary, as irradiance and moments; of the second moment the square root |
 #ifndef GBUFFER_GLSL
 #define GBUFFER_GLSL
 
@@ -56,6 +58,12 @@ layout(set = 1, binding = 26, rgba32f) uniform image2D moments_now;
 layout(set = 1, binding = 27, rgba32f) uniform image2D moments_before;
 layout(set = 1, binding = 28, rgba32f) uniform image2D taa_now;
 layout(set = 1, binding = 29, rgba32f) uniform image2D taa_before;
+layout(set = 1, binding = 30, rgba16ui) uniform uimage2D secondary_guide;
+layout(set = 1, binding = 31, rgba16ui) uniform uimage2D old_secondary_guide;
+layout(set = 1, binding = 32, rgba16ui) uniform uimage2D secondary_radiance_now;
+layout(set = 1, binding = 33, rgba16ui) uniform uimage2D secondary_radiance_before;
+layout(set = 1, binding = 34, rgba16f) uniform image2D secondary_moments_now;
+layout(set = 1, binding = 35, rgba16f) uniform image2D secondary_moments_before;
 
 // Octahedral map of a unit vector to 2 x 16 bits (Meyer et al. 2010).
 uint pack_normal(vec3 n) {

@@ -31,6 +31,19 @@ struct Seen {
     float distance;
 };
 
+#ifdef NOTES_INTERFACE
+// The first surface at which something branches off the eye ray, or may, as it is seen: guide.glsl.
+uvec4 interface_guide = uvec4(0);
+
+void note_interface(Map place, SurfaceHit s) {
+    if (interface_guide != uvec4(0)) return;
+    float depth = dot(mapped(place, s.position, 1.0) - FC.eye, FC.forward);
+    interface_guide = pack_guide(depth, to_view(mapped(place, s.shading_normal, 0.0)), s.material, 0);
+}
+#else
+void note_interface(Map place, SurfaceHit s) {}
+#endif
+
 float chance_on(uint address, uint dimension) {
     return unit_float(bits2(FC.sequence, random_key(FC.seed, address, dimension), sample_index).x);
 }
@@ -124,6 +137,7 @@ Seen see(Path path) {
         }
         vec3 share = out_.share * fog.a;
         float counts = 1.0;
+        if (reflection == REFLECTS_GLOSSY) note_interface(out_.place, s);
         if (reflection == REFLECTS_GLOSSY && !survives(path, branch, share * s.specular, counts)) {
             reflection = REFLECTS_NOT;
             branch++;
@@ -149,6 +163,7 @@ Seen see(Path path) {
                 // In frames that are shown as they come, branches don't branch.
                 bool both = FC.branch_share <= 0.0 || path.depth == 0;
                 if (FC.secondary == SECONDARY_BOTH && branch_count < MOST_BRANCHES && both) {
+                    note_interface(out_.place, s);
                     if (survives(path, branch, share * s.specular, counts)) {
                         branch_count++;
 #ifdef FOLLOWS_BRANCHES

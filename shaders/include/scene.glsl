@@ -459,6 +459,8 @@ struct FrameConstants {
     float branch_share;
     uint guest_count;
     uint draw_sun;
+    uint secondary_levels;
+    uint padding;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

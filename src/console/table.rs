@@ -301,7 +301,7 @@ pub const CVARS: &[Cvar] = &[
         1,
         "lets the denoiser forget at once where the light has changed since the frame before",
     ),
-    int("rt_atrousLevels", 5, 0, 5, "levels of the denoiser's spatial filter"),
+    int("rt_atrousLevels", 4, 0, 5, "levels of the denoiser's spatial filter; reflections take three at most"),
     float(
         "rt_leastAlpha",
         0.05,

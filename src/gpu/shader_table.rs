@@ -52,7 +52,9 @@ shader_table! {
     "gradient_rayquery": "gradient.comp" ["TRACE_RAYQUERY" = "1"];
     "gradient_atrous": "gradient_atrous.comp" [];
     "temporal": "temporal.comp" [];
+    "secondary_temporal": "temporal.comp" ["SECONDARY" = "1"];
     "atrous": "atrous.comp" [];
+    "secondary_atrous": "atrous.comp" ["SECONDARY" = "1"];
     "taa": "taa.comp" [];
     "composite": "composite.comp" [];
     "exposure": "exposure.comp" [];

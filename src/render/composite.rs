@@ -31,6 +31,7 @@ impl Composite {
             g.emission(),
             g.share(),
             g.layers(),
+            g.secondary(),
             g.filter_a(),
             g.filter_b(),
         ] {

@@ -19,7 +19,7 @@ use super::scene_gpu::{RenderError, SceneGpu};
 use super::secondary::Secondary;
 use super::settings::Settings;
 use super::taa::Taa;
-use super::temporal::Temporal;
+use super::temporal::{Channel, Temporal};
 use super::tone_map::ToneMap;
 use super::view_state::ViewState;
 use crate::gpu::{Commands, DescriptorLayout, GpuError, PipelineCache, Timestamps};
@@ -167,6 +167,7 @@ impl FrameRenderer {
         view.gbuffer.parity ^= 1;
         view.anti_aliased = input.anti_aliases();
         let constants = frame_constants(scene, view, slot, input)?;
+        view.branches_off = constants.branches_off != 0;
         let mut constants = {
             if view.entities.0 != input.entities {
                 view.entities = (input.entities.to_vec(), view.entities.1.wrapping_add(1));
@@ -244,6 +245,11 @@ impl FrameRenderer {
                 .record(&mut r, pixels, &view.counters[slot], &view.focus[slot])?;
         }
         let denoises = input.denoises();
+        if denoises && listed.is_some() {
+            self.temporal.record(&mut r, Channel::Secondary, &view.counters[slot])?;
+            self.atrous
+                .record_secondary(&mut r, input.settings.secondary_levels())?;
+        }
         if denoises && constants.changed != 0 {
             self.gradient.record(&mut r, &view.counters[slot], &view.strata)?;
             self.gradient_atrous.record(&mut r)?;
@@ -258,7 +264,7 @@ impl FrameRenderer {
             None => self.direct.record(&mut r, &view.counters[slot], &view.strata)?,
         }
         if denoises {
-            self.temporal.record(&mut r, &view.counters[slot])?;
+            self.temporal.record(&mut r, Channel::Direct, &view.counters[slot])?;
             self.atrous.record(&mut r, input.settings.shown_levels())?;
         }
         self.composite.record(&mut r)?;
@@ -327,6 +333,7 @@ fn frame_constants(
         fixed_exposure: s.exposure,
         strata: view.strata.buffer.address(),
         filter_levels: s.shown_levels(),
+        secondary_levels: s.secondary_levels(),
         denoised: if input.denoises() { 1 + s.shown_levels() % 2 } else { 0 },
         taa: u32::from(input.anti_aliases()),
         least_alpha: s.least_alpha,

@@ -159,6 +159,9 @@ pub struct FrameConstants {
     pub guest_count: u32,
     /// Suns are seen.
     pub draw_sun: u32,
+    /// Levels of the denoiser's filter over what branches off.
+    pub secondary_levels: u32,
+    pub padding: u32,
 }
 
 /// Push constants of every pass.

@@ -32,11 +32,14 @@ const IMAGES: [(&str, vk::Format); 22] = [
 
 /// Name and format of every image that the next frame reads too: this frame's and the one before's stand side by side in set
 /// 1, after [`IMAGES`], and change places from frame to frame.
-const HISTORIES: [(&str, vk::Format); 4] = [
+const HISTORIES: [(&str, vk::Format); 7] = [
     ("guide", vk::Format::R16G16B16A16_UINT),
     ("irradiance", vk::Format::R16G16B16A16_UINT),
     ("moments", vk::Format::R32G32B32A32_SFLOAT),
     ("taa", vk::Format::R32G32B32A32_SFLOAT),
+    ("secondary guide", vk::Format::R16G16B16A16_UINT),
+    ("secondary radiance", vk::Format::R16G16B16A16_UINT),
+    ("secondary moments", vk::Format::R16G16B16A16_SFLOAT),
 ];
 
 /// Pixels per edge of a stratum, which has one gradient.
@@ -111,7 +114,10 @@ accessors!(
     guide = 0,
     irradiance = 1,
     moments = 2,
-    taa = 3
+    taa = 3,
+    secondary_guide = 4,
+    secondary_radiance = 5,
+    secondary_moments = 6
 );
 
 impl GBuffer {

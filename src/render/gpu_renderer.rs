@@ -183,6 +183,15 @@ pub fn radiance(view: &ViewState) -> Result<Vec<[f32; 3]>, RenderError> {
     Ok(floats(image)?.iter().map(|p| [p[0], p[1], p[2]]).collect())
 }
 
+/// How many frames the denoiser's history of each pixel holds.
+///
+/// # Errors
+/// [`RenderError`] of the device.
+pub fn history_lengths(view: &ViewState) -> Result<Vec<f32>, RenderError> {
+    let g = &view.gbuffer;
+    Ok(floats(g.moments().now(g.parity))?.iter().map(|m| m[2]).collect())
+}
+
 /// The frame that a view shows, as a film of one sample.
 ///
 /// # Errors
@@ -193,11 +202,16 @@ pub fn shown_film(view: &ViewState) -> Result<Film, RenderError> {
     film.mean = radiance(view)?;
     film.samples.fill(1.0);
     let (emission, share, layers) = (floats(g.emission())?, floats(g.share())?, floats(g.layers())?);
+    let secondary = if view.branches_off {
+        floats(g.secondary())?
+    } else {
+        vec![[0.0; 4]; film.mean.len()]
+    };
     for i in 0..film.mean.len() {
         for c in 0..3 {
             // Anti-aliasing mixes neighbours: what a pixel's centre emits may be more than the pixel shows.
             let shown = film.mean[i][c];
-            film.transparent[i][c] = layers[i][c].min(shown);
+            film.transparent[i][c] = (layers[i][c] + secondary[i][c]).min(shown);
             film.emission[i][c] = (emission[i][c] * share[i][c]).min(shown - film.transparent[i][c]);
             film.direct[i][c] = shown - film.transparent[i][c] - film.emission[i][c];
         }

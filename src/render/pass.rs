@@ -51,6 +51,19 @@ impl Pass {
     /// # Errors
     /// [`GpuError`] of the device.
     pub fn new(context: &PassContext<'_>, name: &'static str, traced: bool) -> Result<Self, GpuError> {
+        Self::specialized(context, name, traced, &[])
+    }
+
+    /// The same with values of specialization constants by their number.
+    ///
+    /// # Errors
+    /// [`GpuError`] of the device.
+    pub fn specialized(
+        context: &PassContext<'_>,
+        name: &'static str,
+        traced: bool,
+        specialization: &[(u32, u32)],
+    ) -> Result<Self, GpuError> {
         let form = if traced {
             format!("{name}_{}", context.backend)
         } else {
@@ -64,7 +77,7 @@ impl Pass {
                 spirv: &spirv,
                 layouts: &context.layouts,
                 push_constant_bytes: size_of::<Push>() as u32,
-                specialization: &[],
+                specialization,
                 cache: context.cache,
             },
         )?;

@@ -42,6 +42,7 @@ impl Primary {
             g.layers(),
             g.secondary(),
             g.guide().now(g.parity),
+            g.secondary_guide().now(g.parity),
         ] {
             uses.push(Use::image(image, Access::ComputeWrite));
         }

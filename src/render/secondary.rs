@@ -17,13 +17,15 @@ pub struct SecondaryPixels {
 }
 
 impl SecondaryPixels {
-    /// A list with room for every pixel.
+    /// A list with room for every pixel, and a word for every tile of 8 x 8 pixels: whether something may branch off there.
     ///
     /// # Errors
     /// [`GpuError`], out of memory above all.
     pub fn new(device: &Arc<Device>, size: (u32, u32)) -> Result<Self, GpuError> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        let words = HEAD.len() as u64 + u64::from(size.0) * u64::from(size.1);
+        let words = HEAD.len() as u64
+            + u64::from(size.0) * u64::from(size.1)
+            + u64::from(size.0.div_ceil(8)) * u64::from(size.1.div_ceil(8));
         let mut empty = Buffer::new(device, "no secondary pixels", 16, usage, MemoryKind::Upload)?;
         empty.write(0, &HEAD)?;
         Ok(Self {
@@ -71,8 +73,7 @@ impl Secondary {
             Use::buffer(&pixels.buffer, Access::ComputeRead),
             Use::buffer(counters, Access::ComputeReadWrite),
             Use::buffer(focus, Access::ComputeRead),
-            Use::image(r.gbuffer.layers(), Access::ComputeReadWrite),
-            Use::image(r.gbuffer.secondary(), Access::ComputeReadWrite),
+            Use::image(r.gbuffer.secondary(), Access::ComputeWrite),
         ];
         self.0.record_indirect(r, &uses, &pixels.buffer)
     }

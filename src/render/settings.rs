@@ -203,6 +203,8 @@ impl Settings {
 pub const BRANCH_CANDIDATES: u32 = 2;
 /// Most levels of the denoiser's filter.
 const MOST_LEVELS: u32 = 5;
+/// Most levels of that over what branches off: reflections are to stay sharp.
+const MOST_SECONDARY_LEVELS: u32 = 3;
 /// First of the views of the denoiser's filter levels in [`crate::console::table::VIEWS`].
 const FIRST_LEVEL_VIEW: u32 = 18;
 
@@ -214,6 +216,13 @@ impl Settings {
             Some(level) if level < MOST_LEVELS => (level + 1).min(levels),
             _ => levels,
         }
+    }
+}
+
+impl Settings {
+    /// Levels of the denoiser's filter over what branches off.
+    pub fn secondary_levels(&self) -> u32 {
+        self.atrous_levels.min(MOST_SECONDARY_LEVELS)
     }
 }
 
@@ -241,7 +250,7 @@ impl Default for Settings {
             view: 0,
             denoiser: true,
             gradients: true,
-            atrous_levels: 5,
+            atrous_levels: 4,
             least_alpha: 0.05,
             fireflies: 0.0,
             taa: true,

@@ -44,6 +44,8 @@ pub struct ViewState {
     pub moving: Option<Moving>,
     /// Whether the last frame shows the image `taa`, else `composite`.
     pub anti_aliased: bool,
+    /// Whether the last frame followed what branches off: the image `secondary` is of it.
+    pub branches_off: bool,
 }
 
 impl ViewState {
@@ -93,6 +95,7 @@ impl ViewState {
             history: FrameHistory::default(),
             moving: None,
             anti_aliased: false,
+            branches_off: false,
         })
     }
 
