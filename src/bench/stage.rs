@@ -1,0 +1,177 @@
+//! What benchmarks of the picture have in common: frames of a scene as they are shown, and references of them.
+
+use super::lights::{Config, Mode};
+use super::references::{Pixels, References, mean};
+use crate::gpu::SubmitSync;
+use crate::metrics::{ImageRgb, Kind, Metrics, MetricsError, compare};
+use crate::output::stats::FrameStats;
+use crate::render::frame::FrameInput;
+use crate::render::gpu_renderer::{film, radiance};
+use crate::render::realtime::Realtime;
+use crate::render::scene_gpu::{RenderError, SceneGpu};
+use crate::render::settings::{AmbientLight, Settings};
+use crate::scene::camera::Camera;
+use serde::Serialize;
+use std::sync::Arc;
+
+/// What references take of each sample.
+const REFERENCE: Config = Config {
+    mode: Mode::Resampled,
+    lights: 4,
+    candidates: 4,
+    neighbours: 0,
+};
+
+/// Figures of an image against references; see [`crate::metrics::Metrics`]. The errors' denominator is that of
+/// [`References::error`].
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Figures {
+    pub rel_mse: f64,
+    pub rel_mse_trimmed: f64,
+    pub ssim: f64,
+    pub flip: f64,
+    pub mean_ratio: f64,
+}
+
+impl Figures {
+    /// Means over some runs.
+    pub fn mean(runs: &[Self]) -> Self {
+        let of = |f: fn(&Self) -> f64| runs.iter().map(f).sum::<f64>() / runs.len().max(1) as f64;
+        Self {
+            rel_mse: of(|r| r.rel_mse),
+            rel_mse_trimmed: of(|r| r.rel_mse_trimmed),
+            ssim: of(|r| r.ssim),
+            flip: of(|r| r.flip),
+            mean_ratio: of(|r| r.mean_ratio),
+        }
+    }
+}
+
+/// A scene, a size, and settings that all frames share: pinhole, no ambient light.
+pub struct Stage {
+    pub realtime: Realtime,
+    pub base: Settings,
+    pub size: (u32, u32),
+    /// Samples of each reference.
+    pub references: u32,
+}
+
+impl Stage {
+    /// Prepares the frames of a scene.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn new(scene: Arc<SceneGpu>, base: &Settings, size: (u32, u32), references: u32) -> Result<Self, RenderError> {
+        Ok(Self {
+            realtime: Realtime::new(scene, size, None)?,
+            base: Settings {
+                aperture: 0.0,
+                ambient: AmbientLight::Off,
+                ..*base
+            },
+            size,
+            references,
+        })
+    }
+
+    /// Renders a frame; returns the statistics of an earlier one.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn frame(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        index: u32,
+        accumulated: u32,
+    ) -> Result<Option<FrameStats>, RenderError> {
+        let input = FrameInput {
+            camera: *camera,
+            settings: *settings,
+            lights: &[],
+            polygons: &[],
+            entities: &[],
+            sample_index: index,
+            accumulated,
+            exposure_blend: 1.0,
+            reuse: accumulated == 0,
+            output: accumulated == 0,
+        };
+        self.realtime
+            .frame(&input, |shown| shown.frame.submit(SubmitSync::default()))
+    }
+
+    /// Mean of so many samples.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn accumulated(&mut self, camera: &Camera, settings: &Settings, samples: u32) -> Result<Pixels, RenderError> {
+        for n in 0..samples {
+            self.frame(camera, settings, n, n + 1)?;
+        }
+        self.realtime.finish()?;
+        Ok(film(&self.realtime.view, samples)?.mean)
+    }
+
+    /// Two references of a view.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn references(&mut self, camera: &Camera) -> Result<References, RenderError> {
+        let mut images = [Vec::new(), Vec::new()];
+        for (i, image) in images.iter_mut().enumerate() {
+            let settings = Settings {
+                seed: self.base.seed.wrapping_add(0x51ed_0001 + i as u32),
+                ..REFERENCE.settings(&self.base)
+            };
+            *image = self.accumulated(camera, &settings, self.references)?;
+        }
+        Ok(References::new(images))
+    }
+
+    /// The image that the last frame shows.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn shown(&mut self) -> Result<Pixels, RenderError> {
+        self.realtime.finish()?;
+        radiance(&self.realtime.view)
+    }
+
+    /// An image of the stage's size.
+    pub fn image(&self, pixels: Pixels) -> ImageRgb {
+        ImageRgb {
+            width: self.size.0 as usize,
+            height: self.size.1 as usize,
+            pixels,
+        }
+    }
+
+    /// All figures of an image against the mean of two references, counting the pixels of a mask.
+    ///
+    /// # Errors
+    /// [`MetricsError`] where the sizes differ.
+    pub fn compare(
+        &self,
+        image: &[[f32; 3]],
+        references: &References,
+        mask: Option<&[bool]>,
+    ) -> Result<Metrics, MetricsError> {
+        let truth = self.image(references.joined());
+        compare(&self.image(image.to_vec()), &truth, Kind::Linear, mask)
+    }
+
+    /// Figures of an image.
+    pub fn figures(&self, image: &[[f32; 3]], references: &References) -> Figures {
+        let (rel_mse, rel_mse_trimmed) = references.error(image);
+        let metrics = self.compare(image, references, None).ok();
+        let figure = |f: Option<f64>| f.unwrap_or(f64::NAN);
+        Figures {
+            rel_mse,
+            rel_mse_trimmed,
+            ssim: figure(metrics.as_ref().and_then(|m| m.ssim)),
+            flip: figure(metrics.as_ref().and_then(|m| m.flip)),
+            mean_ratio: mean(image) / references.mean,
+        }
+    }
+}
