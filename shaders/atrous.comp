@@ -2,8 +2,7 @@
 // A level of the denoiser's filter: edge-stopping à-trous wavelets (Dammertz et al. 2010; Schied et al. 2017, section 4.3).
 //
 // It keeps energy: c' = c + Σ w(p,q)·(c_q − c_p) with w(p,q) = w(q,p), so that what one pixel gives its neighbour gets (of the result
-// shown; what is fed back is a mixture by pixel), and
-// Σ w ≤ 3/4. A level takes the kernel (1 2 1) ⊗ (1 2 1) / 16 at 2^level pixels: all eight neighbours, since with four a level, which is
+// shown; what is fed back is a mixture by pixel), and Σ w ≤ 3/4. A level takes the kernel (1 2 1) ⊗ (1 2 1) / 16 at 2^level pixels: all eight neighbours, since with four a level, which is
 // faster, a lone bright sample became a lattice of dots.
 //
 // Unpacking is what costs, so each pixel is unpacked once by the work group that needs it, into shared memory. A group makes 32 columns

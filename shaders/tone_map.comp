@@ -53,7 +53,7 @@ vec3 intermediate(ivec2 p) {
         case 15: return displayed(vec3(moments.x, sqrt(moments.y), 0.0));
         case 16: return vec3(gradient_at(p));
         case 17: return vec3(imageLoad(gbuffer_motion, p).xy / 32.0 + 0.5, 0.5);
-        case 23: return displayed(imageLoad(image_secondary, p).rgb);
+        case 23: return displayed(FC.branches_off != 0 ? imageLoad(image_secondary, p).rgb : vec3(0.0));
         // The denoised irradiance, and the levels of the filter: the last one that runs is what is shown.
         case 11:
         default: return displayed(filtered.rgb);

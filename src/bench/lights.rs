@@ -161,7 +161,7 @@ const APART: u32 = 8;
 const RUNS: u32 = 16;
 const RUN_FRAMES: u32 = 6;
 /// What references take of each sample.
-const REFERENCE: Config = Config {
+pub(super) const REFERENCE: Config = Config {
     mode: Mode::Resampled,
     lights: 4,
     candidates: 4,

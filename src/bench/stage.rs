@@ -1,6 +1,6 @@
 //! What benchmarks of the picture have in common: frames of a scene as they are shown, and references of them.
 
-use super::lights::{Config, Mode};
+use super::lights::REFERENCE;
 use super::references::{Pixels, References, mean};
 use crate::gpu::SubmitSync;
 use crate::metrics::{ImageRgb, Kind, Metrics, MetricsError, compare};
@@ -13,14 +13,6 @@ use crate::render::settings::{AmbientLight, Settings};
 use crate::scene::camera::Camera;
 use serde::Serialize;
 use std::sync::Arc;
-
-/// What references take of each sample.
-const REFERENCE: Config = Config {
-    mode: Mode::Resampled,
-    lights: 4,
-    candidates: 4,
-    neighbours: 0,
-};
 
 /// Figures of an image against references; see [`crate::metrics::Metrics`]. The errors' denominator is that of
 /// [`References::error`].
