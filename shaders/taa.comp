@@ -8,6 +8,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "prelude.glsl"
 #include "gbuffer.glsl"
+#include "gradient.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -120,7 +121,9 @@ vec4 blended(ivec2 p, vec3 own, float e) {
     // What is fetched from between pixels is blurred: it counts the less.
     vec2 off = place - round(place);
     float between = 2.0 * max(abs(off.x), abs(off.y));
-    float frames = min(before.a + 1.0, 1.0 / mix(LEAST_WEIGHT, LEAST_BETWEEN, between));
+    // And what shows light that has changed since counts the less, as in the denoiser's history.
+    float kept = FC.denoised != 0 ? before.a * (1.0 - gradient_at(p)) : before.a;
+    float frames = min(kept + 1.0, 1.0 / mix(LEAST_WEIGHT, LEAST_BETWEEN, between));
     // Linear light, each weighted by what compression leaves of it (Karis 2014).
     vec3 old = max(expand(held, e), vec3(0.0));
     float old_weight = (1.0 - 1.0 / frames) / (1.0 + to_ycocg(old).x * e);

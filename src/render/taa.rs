@@ -22,7 +22,7 @@ impl Taa {
     /// [`GpuError`] of the device.
     pub fn record(&self, r: &mut Recorder<'_>, exposure: &Buffer) -> Result<(), GpuError> {
         let g = r.gbuffer;
-        let read = [g.composite(), g.motion(), g.taa().before(g.parity)];
+        let read = [g.composite(), g.motion(), g.gradient_a(), g.taa().before(g.parity)];
         let mut uses: Vec<_> = read.map(|i| Use::image(i, Access::ComputeRead)).into();
         uses.push(Use::buffer(exposure, Access::ComputeRead));
         uses.push(Use::image(g.taa().now(g.parity), Access::ComputeWrite));

@@ -1,0 +1,172 @@
+//! How soon denoised frames follow what changes: a lamp that goes out, and something that moves out of the light.
+
+mod common;
+#[allow(dead_code, reason = "part of a shared module")]
+mod gpu_fixture;
+
+use common::analytic::boxed;
+use common::{camera, scene};
+use glam::Vec3;
+use gpu_fixture::with_device;
+use q3rays::assets::bsp::build::{Bounds, Entity, Mapping, Paint, Solid};
+use q3rays::assets::bsp::lumps::{content_flags, surface_flags};
+use q3rays::render::backend::Backend;
+use q3rays::render::frame::FrameInput;
+use q3rays::render::gpu_renderer::{GpuRenderer, film, radiance};
+use q3rays::render::scene_gpu::SceneGpu;
+use q3rays::render::settings::{AmbientLight, Settings};
+use q3rays::scene::Scene;
+use q3rays::scene::bvh::BvhQuality;
+use q3rays::scene::camera::Camera;
+use q3rays::scene::entity_geometry::EntityState;
+use q3rays::scene::lights::point_light;
+use q3rays::scene::records::Light;
+
+const SIZE: (u32, u32) = (160, 90);
+/// Frames before the change, and most that are waited for after it.
+const BEFORE: u32 = 24;
+const MOST: u32 = 64;
+
+/// A box with a lamp under its ceiling, and below that a board that a door carries.
+fn board() -> Scene {
+    let script = "textures/fixture/board\n{\n\t{\n\t\tmap $whiteimage\n\t}\n}\n";
+    scene(&boxed("board", script, |map, _| {
+        let paint = Paint {
+            shader: map.shader("textures/fixture/board", surface_flags::NODLIGHT, content_flags::SOLID),
+            mapping: Mapping::Fit,
+        };
+        let solid = Solid {
+            bounds: Bounds::new([-40, -40, -4], [40, 40, 4]),
+            faces: [Some(paint); 6],
+            contents: paint.shader,
+            carves: false,
+        };
+        let door = Entity::new("func_door")
+            .with("origin", "140 128 150")
+            .with("angle", "-1");
+        map.brush_model(vec![solid], door);
+        map.entity(Entity::light(Vec3::new(140.0, 128.0, 240.0), 300.0, [1.0; 3]));
+        map.entity(Entity::light(Vec3::new(230.0, 20.0, 100.0), 40.0, [1.0; 3]));
+    }))
+}
+
+fn settings(gradients: bool) -> Settings {
+    Settings {
+        ambient: AmbientLight::Off,
+        gradients,
+        ..Settings::default()
+    }
+}
+
+fn view() -> Camera {
+    camera([16.0, 128.0, 90.0], 25.0, 0.0, 90.0)
+}
+
+/// What a frame shows beside the map.
+#[derive(Clone, Copy)]
+struct Shown<'a> {
+    lights: &'a [Light],
+    entities: &'a [EntityState],
+}
+
+fn input<'a>(shown: Shown<'a>, settings: &Settings, index: u32, accumulated: u32) -> FrameInput<'a> {
+    FrameInput {
+        camera: view(),
+        settings: *settings,
+        lights: shown.lights,
+        polygons: &[],
+        entities: shown.entities,
+        sample_index: index,
+        accumulated,
+        exposure_blend: 1.0,
+        reuse: accumulated == 0,
+        output: accumulated == 0,
+    }
+}
+
+fn truth(renderer: &GpuRenderer, shown: Shown<'_>) -> Vec<[f32; 3]> {
+    let every = Settings {
+        random_lights: 0,
+        ..settings(true)
+    };
+    let mut view = renderer.view(SIZE).unwrap();
+    for n in 0..64 {
+        renderer.frame(&mut view, &input(shown, &every, n, n + 1)).unwrap();
+    }
+    film(&view, 64).unwrap().mean
+}
+
+/// Mean over the pixels of the lower half whose truth changes by more than three tenths.
+fn region(before: &[[f32; 3]], after: &[[f32; 3]]) -> Vec<usize> {
+    let half = before.len() / 2;
+    (half..before.len())
+        .filter(|i| {
+            let (a, b) = (before[*i][1], after[*i][1]);
+            (a - b).abs() > 0.3 * a.max(b)
+        })
+        .collect()
+}
+
+fn mean(image: &[[f32; 3]], region: &[usize]) -> f64 {
+    region.iter().map(|i| f64::from(image[*i][1])).sum::<f64>() / region.len() as f64
+}
+
+/// Frames after the last of `steps` until the region's mean is within 10% of the new truth and stays there for 8 frames.
+fn frames_to_follow(renderer: &GpuRenderer, steps: &[Shown<'_>], gradients: bool) -> u32 {
+    let (first, last) = (steps[0], steps[steps.len() - 1]);
+    let (before, after) = (truth(renderer, first), truth(renderer, last));
+    let region = region(&before, &after);
+    assert!(region.len() > 200, "{} pixels change", region.len());
+    let wanted = mean(&after, &region);
+    let settings = settings(gradients);
+    let mut view = renderer.view(SIZE).unwrap();
+    let mut index = 0;
+    let mut show = |shown: Shown<'_>| {
+        renderer.frame(&mut view, &input(shown, &settings, index, 0)).unwrap();
+        index += 1;
+        (mean(&radiance(&view).unwrap(), &region) / wanted - 1.0).abs() < 0.1
+    };
+    for _ in 0..BEFORE {
+        show(first);
+    }
+    for step in &steps[1..steps.len() - 1] {
+        show(*step);
+    }
+    let good: Vec<bool> = (0..MOST).map(|_| show(last)).collect();
+    let held = good.windows(8).position(|w| w.iter().all(|g| *g));
+    held.map_or(u32::MAX, |frames| frames as u32 + 1)
+}
+
+#[test]
+fn what_changes_is_followed_within_four_frames_with_gradients() {
+    with_device(|device| {
+        let scene = board();
+        let gpu = SceneGpu::new(device, &scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
+        let renderer = GpuRenderer::new(&gpu).unwrap();
+        let number = scene.entities.iter().position(|e| e.class() == "func_door").unwrap() as u32;
+        let lamp = [point_light(Vec3::new(100.0, 70.0, 60.0), 200.0, Vec3::ONE)];
+        let at = |offset: f32| {
+            [EntityState {
+                entity: number,
+                offset: Vec3::Y * offset,
+                hidden: false,
+            }]
+        };
+        let places: Vec<_> = (0..=8).map(|i| at(10.0 * i as f32)).collect();
+        let slides: Vec<Shown<'_>> = places.iter().map(|entities| Shown { lights: &[], entities }).collect();
+        let still = |lights| Shown { lights, entities: &[] };
+        let cases: [(&str, Vec<Shown<'_>>); 4] = [
+            ("a lamp goes out", vec![still(&lamp), still(&[])]),
+            ("a lamp goes on", vec![still(&[]), still(&lamp)]),
+            ("a board moves out of the light at once", vec![slides[0], slides[8]]),
+            ("a board moves out of the light in 8 frames", slides.clone()),
+        ];
+        for (name, steps) in &cases {
+            let with = frames_to_follow(&renderer, steps, true);
+            let without = frames_to_follow(&renderer, steps, false);
+            println!("{name}: {with} frames with gradients, {without} without");
+            assert!(with <= 4, "{name}: {with} frames with gradients");
+            assert!(without > with, "{name}: {without} frames without gradients");
+        }
+    });
+}
