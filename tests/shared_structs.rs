@@ -390,7 +390,7 @@ fn records() -> Vec<Record> {
             guest_count,
             draw_sun,
             secondary_levels,
-            padding
+            white
         }),
         record!(Push {
             frame,

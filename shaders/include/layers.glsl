@@ -100,12 +100,16 @@ Seen see(Path path) {
         SurfaceHit s = shaded_hit(hit, direction, FC.cone * (1.0 + travelled / hit.t));
         if (!drawn(material, s.front)) continue;
         bool layer = (material.flags & MATERIAL_LAYER) != 0;
+        if (FC.white != 0) {
+            if (layer) continue;
+            if ((material.flags & MATERIAL_SKY) == 0) whiten(s);
+        }
         bool follows = FC.secondary != SECONDARY_OFF && depth < FC.max_depth;
         uint reflection = REFLECTS_NOT;
         if (follows) reflection = split(material, s, direction, out_.share);
         else unsplit(s);
         vec3 emission = emission_met(pdf, path, s, hit, direction);
-        vec4 there = fog_at(origin, direction, hit.t);
+        vec4 there = FC.white != 0 ? fog : fog_at(origin, direction, hit.t);
         out_.layers += out_.share * (there.rgb - fog.rgb);
         fog = there;
         if (pending) {

@@ -460,7 +460,7 @@ struct FrameConstants {
     uint guest_count;
     uint draw_sun;
     uint secondary_levels;
-    uint padding;
+    uint white;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

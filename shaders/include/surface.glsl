@@ -214,6 +214,13 @@ void locate(inout SurfaceHit s) {
     if (s.cluster != NONE) s.row = s.cluster;
 }
 
+// Makes a surface reflect all light alike, and nothing else.
+void whiten(inout SurfaceHit s) {
+    s.albedo = vec3(1.0);
+    s.glow = vec3(0.0);
+    s.specular = vec3(0.0);
+}
+
 // Whether a surface is drawn on the side that a ray meets.
 bool drawn(Material material, bool front) {
     return (material.flags & (front ? MATERIAL_NO_FRONT : MATERIAL_BACK)) == (front ? 0 : MATERIAL_BACK);

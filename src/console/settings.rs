@@ -89,6 +89,7 @@ pub fn settings(cvars: &Cvars) -> Settings {
         lod_bias: number("r_lodbias") as i32,
         flashlight: number("rt_flashlight") as f32,
         draw_sun: on("r_drawSun"),
+        white: on("r_lightmap"),
         clock: Clock::default(),
         shutter: number("rt_motionblur") as f32 / FRAME_RATE,
     }

@@ -345,6 +345,13 @@ pub const CVARS: &[Cvar] = &[
         "shows the weapon before the eye, where there is a player",
     ),
     int(
+        "r_lightmap",
+        0,
+        0,
+        1,
+        "shows light alone: surfaces are white, and nothing see-through is drawn",
+    ),
+    int(
         "r_drawSun",
         0,
         0,

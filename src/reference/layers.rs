@@ -16,7 +16,7 @@ use super::visibility::ON_RECEIVER;
 use crate::render::settings::{Secondary, Settings};
 use crate::scene::Scene;
 use crate::scene::light_power::luminance;
-use crate::scene::records::{MATERIAL_LAYER, MATERIAL_PORTAL, SEEN_BY_EYE, SEEN_BY_REFLECTIONS};
+use crate::scene::records::{MATERIAL_LAYER, MATERIAL_PORTAL, MATERIAL_SKY, SEEN_BY_EYE, SEEN_BY_REFLECTIONS};
 use crate::scene::sampling::{DIM_LAYER, bits2, key, unit};
 use glam::Vec3;
 
@@ -131,6 +131,12 @@ pub fn see(
             continue;
         }
         let layer = material.flags & MATERIAL_LAYER != 0;
+        if settings.white && layer {
+            continue;
+        }
+        if settings.white && material.flags & MATERIAL_SKY == 0 {
+            surface.whiten();
+        }
         let follows = settings.branches() != Secondary::Off && depth < settings.max_depth;
         let reflection = if follows {
             split(material, &mut surface, ray.direction, out.share)
@@ -139,7 +145,11 @@ pub fn see(
             Reflection::None
         };
         let emission = emission_met(scene, tracer, settings, lobe, &surface, &hit, ray.direction);
-        let there = scene.fogs.at(ray.origin, ray.direction, hit.t as f32);
+        let there = if settings.white {
+            fog
+        } else {
+            scene.fogs.at(ray.origin, ray.direction, hit.t as f32)
+        };
         out.layers += out.share * (there.0 - fog.0);
         fog = there;
         if let Some(p) = pending {

@@ -47,6 +47,13 @@ pub struct SurfaceHit {
 }
 
 impl SurfaceHit {
+    /// Makes the surface reflect all light alike, and nothing else.
+    pub fn whiten(&mut self) {
+        self.albedo = Vec3::ONE;
+        self.glow = Vec3::ZERO;
+        self.specular = Vec3::ZERO;
+    }
+
     /// A point that receives light, for samplers that look at nothing else.
     pub fn receiver(position: Vec3, normal: Vec3, row: u32) -> Self {
         Self {

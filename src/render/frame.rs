@@ -309,6 +309,7 @@ fn frame_constants(
         guest_lights,
         guest_count: guests.len() as u32,
         draw_sun: u32::from(s.draw_sun),
+        white: u32::from(s.white),
         counters: view.counters[slot].address(),
         exposure: view.exposure.address(),
         focus: view.focus[slot].address(),

@@ -161,7 +161,8 @@ pub struct FrameConstants {
     pub draw_sun: u32,
     /// Levels of the denoiser's filter over what branches off.
     pub secondary_levels: u32,
-    pub padding: u32,
+    /// Surfaces are white, and what is see-through is not there to the eye.
+    pub white: u32,
 }
 
 /// Push constants of every pass.

@@ -68,6 +68,8 @@ pub enum Secondary {
 pub struct Settings {
     /// Light the scene; else show albedo.
     pub illumination: bool,
+    /// Show light alone: surfaces are white, and what is see-through is not there to the eye.
+    pub white: bool,
     /// 0 all lights, 1 the PVS row, 2 the tight row.
     pub cull_lights: u32,
     /// Lights sampled at random per hit; 0: every light of the row.
@@ -140,7 +142,7 @@ pub struct Settings {
 impl Settings {
     /// What is followed at interfaces: nothing where light is not asked for.
     pub fn branches(&self) -> Secondary {
-        if self.illumination {
+        if self.illumination && !self.white {
             self.secondary
         } else {
             Secondary::Off
@@ -230,6 +232,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             illumination: true,
+            white: false,
             cull_lights: 1,
             random_lights: 1,
             light_sampling: LightSampling::Reservoir,
