@@ -10,6 +10,7 @@ pub mod cli;
 pub mod console;
 pub mod content;
 pub mod engine;
+pub mod export;
 pub mod game;
 pub mod gpu;
 pub mod lighting;

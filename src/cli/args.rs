@@ -1,6 +1,6 @@
 //! Arguments: sub-commands by `clap`, and Quake's `+set NAME VALUE` and `+COMMAND` anywhere.
 
-use super::{bench, common::Common, compare, info, lights, maps, merge, play, render};
+use super::{bench, common::Common, compare, export, info, lights, maps, merge, play, render};
 use crate::console::Cvars;
 use crate::console::commands::{find, meant};
 use crate::console::cvars::cvar;
@@ -66,6 +66,8 @@ enum Command {
     Compare(compare::Args),
     /// Join partial accumulations into one EXR
     Merge(merge::Args),
+    /// Write a map as glTF, for other programs
+    Export(export::Args),
 }
 
 /// Console words taken off the command line.
@@ -174,6 +176,7 @@ fn dispatch() -> CliResult {
         Some(Command::Bench(args)) => bench::run(&cli.common, &cvars, &args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
+        Some(Command::Export(args)) => export::run(&cli.common, &cvars, &args),
         Some(Command::Play(args)) => play::run(&cli.common, cvars, args, console),
         None => play::run(&cli.common, cvars, play::Args::default(), console),
     }

@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod common;
 mod compare;
+mod export;
 mod info;
 mod light_list;
 mod lights;
