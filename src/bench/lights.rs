@@ -14,7 +14,7 @@ use crate::render::realtime::Realtime;
 use crate::render::scene_gpu::{RenderError, SceneGpu};
 use crate::render::settings::{AmbientLight, LightSampling, Settings};
 use crate::scene::camera::Camera;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ pub struct Config {
 }
 
 /// The ways to choose; resampling without and with reuse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     Uniform,

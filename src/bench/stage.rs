@@ -10,8 +10,10 @@ use crate::render::gpu_renderer::{film, radiance};
 use crate::render::realtime::Realtime;
 use crate::render::scene_gpu::{RenderError, SceneGpu};
 use crate::render::settings::{AmbientLight, Settings};
+use crate::render::tonemap::{automatic_exposure, display};
 use crate::scene::camera::Camera;
 use serde::Serialize;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Figures of an image against references; see [`crate::metrics::Metrics`]. The errors' denominator is that of
@@ -98,11 +100,34 @@ impl Stage {
     /// # Errors
     /// [`RenderError`] of the device.
     pub fn accumulated(&mut self, camera: &Camera, settings: &Settings, samples: u32) -> Result<Pixels, RenderError> {
-        for n in 0..samples {
-            self.frame(camera, settings, n, n + 1)?;
+        self.accumulated_from(camera, settings, 0..samples)
+    }
+
+    /// Mean of the samples with these numbers.
+    ///
+    /// # Errors
+    /// [`RenderError`] of the device.
+    pub fn accumulated_from(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+        samples: Range<u32>,
+    ) -> Result<Pixels, RenderError> {
+        let count = samples.end - samples.start;
+        for (n, index) in samples.enumerate() {
+            self.frame(camera, settings, index, n as u32 + 1)?;
         }
         self.realtime.finish()?;
-        Ok(film(&self.realtime.view, samples)?.mean)
+        Ok(film(&self.realtime.view, count)?.mean)
+    }
+
+    /// Display pixels of an image at the exposure that suits the truth.
+    pub fn displayed(&self, image: &[[f32; 3]], truth: &[[f32; 3]]) -> Vec<[u8; 3]> {
+        let exposure = match self.base.exposure {
+            e if e > 0.0 => e,
+            _ => automatic_exposure(truth, self.size.0, self.size.1),
+        };
+        image.iter().map(|p| display(*p, exposure, self.base.tonemap)).collect()
     }
 
     /// Two references of a view.

@@ -1,6 +1,7 @@
 //! Files that are written: images, EXR, statistics.
 
 pub mod atomic;
+pub mod checksum;
 pub mod exr_file;
 pub mod picture;
 pub mod png_file;

@@ -2,7 +2,7 @@
 
 use super::{OutputError, atomic};
 use crate::reference::direct::RayCounts;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -22,7 +22,7 @@ pub struct FrameStats {
 }
 
 /// Percentiles over the frames: of GPU time where there is one, else of CPU time; milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     pub p50: f64,
     pub p95: f64,

@@ -5,6 +5,7 @@ use super::recover::{Options, RecoveryError, recover};
 use crate::assets::vfs::search_path::map_path;
 use crate::assets::vfs::{FileSource, VfsError};
 use crate::output::atomic;
+use crate::output::checksum::fnv1a;
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -41,19 +42,10 @@ pub struct Loaded {
     pub warning: Option<String>,
 }
 
-/// FNV-1a over 64 bits.
-fn checksum(parts: &[&[u8]]) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325u64;
-    for byte in parts.iter().flat_map(|p| p.iter()) {
-        hash = (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
-    }
-    hash
-}
-
 /// The file in `folder` that holds the lights of a map with these bytes, recovered with these options.
 pub fn path(folder: &Path, map: &str, bytes: &[u8], options: &Options) -> PathBuf {
     let options = format!("{VERSION} {options:?}");
-    let hash = checksum(&[bytes, options.as_bytes()]);
+    let hash = fnv1a(&[bytes, options.as_bytes()]);
     let name = map.rsplit('/').next().unwrap_or(map);
     folder.join(format!("{name}-{hash:016x}.lights"))
 }

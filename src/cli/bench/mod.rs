@@ -1,8 +1,12 @@
 //! `q3rays bench`
 
+mod comparison;
+mod error;
+mod frames;
 mod lights;
 mod pictures;
 mod rays;
+mod results;
 mod structures;
 
 use super::args::{CliError, CliResult};
@@ -23,13 +27,20 @@ const FOV: f32 = 90.0;
 
 /// Arguments of `bench`.
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Args {
     #[command(subcommand)]
-    what: What,
+    what: Option<What>,
+    #[command(flatten)]
+    frames: frames::FramesArgs,
 }
 
 #[derive(clap::Subcommand)]
 enum What {
+    /// Run time against error of many choices of settings
+    Error(error::ErrorArgs),
+    /// What got faster, slower or less accurate from one run to another
+    Compare(comparison::CompareArgs),
     /// Rays per second of the traversal alone
     Rays(rays::RaysArgs),
     /// Error against time of the ways to choose a light
@@ -46,7 +57,12 @@ enum What {
 
 /// Runs a benchmark.
 pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
-    match &args.what {
+    let Some(what) = &args.what else {
+        return frames::run(common, cvars, &args.frames);
+    };
+    match what {
+        What::Error(args) => error::run(common, cvars, args),
+        What::Compare(args) => comparison::run(args),
         What::Rays(args) => rays::run(common, cvars, args),
         What::Lights(args) => lights::run(common, cvars, args),
         What::Structures(args) => structures::run(common, cvars, args),
@@ -58,11 +74,21 @@ pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
 
 /// The Vulkan device that is measured.
 fn vulkan(common: &Common, cvars: &Cvars, name: &str) -> Result<(Arc<Device>, Backend), CliError> {
-    match common.engine(cvars)? {
+    match vulkan_engine(common, cvars, name)? {
         Engine::Vulkan { device, backend } => Ok((device, backend)),
-        Engine::Cpu => Err(CliError::Failed(format!(
-            "bench {name} measures Vulkan devices; there is none"
-        ))),
+        Engine::Cpu => Err(no_device(name)),
+    }
+}
+
+fn no_device(name: &str) -> CliError {
+    CliError::Failed(format!("bench {name} measures Vulkan devices; there is none"))
+}
+
+/// The same as an engine.
+fn vulkan_engine(common: &Common, cvars: &Cvars, name: &str) -> Result<Engine, CliError> {
+    match common.engine(cvars)? {
+        Engine::Cpu => Err(no_device(name)),
+        engine => Ok(engine),
     }
 }
 
