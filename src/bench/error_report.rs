@@ -5,6 +5,7 @@ use super::page::Page;
 use super::plot::{Axis, PlotError, Series, Style, chart, short};
 use super::run_info::RunInfo;
 use super::sweep::FAMILIES;
+use crate::output::png_file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -234,8 +235,8 @@ fn view(page: &mut Page, v: &ViewErrors, folder: &Path) -> Result<(), PlotError>
     along(page, v)?;
     for p in &v.pictures {
         for (file, what) in [(&p.shown, p.name.clone()), (&p.heatmap, format!("{}: FLIP", p.name))] {
-            if let Ok(png) = std::fs::read(folder.join(file)) {
-                page.picture(&png, &format!("{what} ({file})"));
+            if let Ok((width, height, pixels)) = png_file::read_bytes(&folder.join(file)) {
+                page.picture(width, height, &pixels, &format!("{what} ({file})"));
             }
         }
     }

@@ -11,6 +11,8 @@ text-align:right}th:first-child,td:first-child{text-align:left}th{background:#f4
 inline-block;vertical-align:top;max-width:100%}figcaption{font-size:12px;color:#555;max-width:720px}img{max-width:100%}\
 svg{max-width:100%;height:auto}.scroll{overflow-x:auto}code{background:#f4f4f4;padding:1px 4px}";
 
+const JPEG_QUALITY: u8 = 85;
+
 /// See the module.
 pub struct Page {
     title: String,
@@ -78,13 +80,26 @@ impl Page {
         ));
     }
 
-    /// A PNG with a caption.
-    pub fn picture(&mut self, png: &[u8], caption: &str) {
-        let data = BASE64_STANDARD.encode(png);
+    /// A picture with a caption, of 8-bit sRGB: as JPEG, because noise makes large PNGs; the files beside the page are exact.
+    pub fn picture(&mut self, width: u32, height: u32, pixels: &[[u8; 3]], caption: &str) {
+        let mut bytes = Vec::new();
+        let encoded = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).encode(
+            pixels.as_flattened(),
+            width,
+            height,
+            image::ExtendedColorType::Rgb8,
+        );
         let caption = escaped(caption);
-        self.add(format_args!(
-            "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>\n"
-        ));
+        match encoded {
+            Ok(()) => {
+                let data = BASE64_STANDARD.encode(&bytes);
+                self.add(format_args!(
+                    "<figure><img alt=\"{caption}\" src=\"data:image/jpeg;base64,{data}\">\
+                     <figcaption>{caption}</figcaption></figure>\n"
+                ));
+            }
+            Err(e) => self.paragraph(&format!("The picture {caption} cannot be shown: {e}.")),
+        }
     }
 
     /// The file.
@@ -107,8 +122,12 @@ mod tests {
     fn text_is_no_markup() {
         let mut page = Page::new("a<b");
         page.table(&["x"], &[vec!["<script>".into()]]);
-        page.picture(b"png", "\"c\"");
+        page.picture(1, 1, &[[255, 0, 0]], "\"c\"");
         let html = page.html();
-        assert!(!html.contains("<script>") && html.contains("<title>a&lt;b</title>") && html.contains("cG5n"));
+        assert!(
+            !html.contains("<script>")
+                && html.contains("<title>a&lt;b</title>")
+                && html.contains("image/jpeg;base64,/9j/")
+        );
     }
 }

@@ -66,6 +66,8 @@ fn span(values: impl Iterator<Item = f64>, axis: Axis<'_>) -> (f64, f64) {
     let (lo, hi) = usable.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
     match (lo <= hi, axis.logarithmic) {
         (false, _) => (0.1, 10.0),
+        // Whole decades where there are few: numbers stand at these alone.
+        (true, true) if hi < 100.0 * lo => (10f64.powf(lo.log10().floor()), 10f64.powf((hi * 1.001).log10().ceil())),
         (true, true) => (lo / 1.3, hi * 1.3),
         // Times and counts begin at 0, so that lengths can be compared.
         (true, false) => {

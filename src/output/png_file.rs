@@ -33,6 +33,16 @@ pub fn write(
     atomic::write(path, &bytes)
 }
 
+/// Reads any PNG as 8-bit encoded RGB, alpha dropped.
+///
+/// # Errors
+/// [`OutputError::Read`].
+pub fn read_bytes(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>), OutputError> {
+    let (w, h, pixels) = read(path)?;
+    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+    Ok((w, h, pixels.into_iter().map(|p| p.map(byte)).collect()))
+}
+
 /// Reads any 8- or 16-bit PNG as encoded RGB in 0..1, alpha dropped.
 ///
 /// # Errors
