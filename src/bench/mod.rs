@@ -7,6 +7,7 @@ pub mod denoiser;
 pub mod denoiser_report;
 pub mod error;
 pub mod error_report;
+pub mod figures;
 pub mod frames;
 pub mod frames_report;
 pub mod lights;

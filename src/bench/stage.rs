@@ -178,6 +178,27 @@ impl Stage {
         compare(&self.image(image.to_vec()), &truth, Kind::Linear, mask)
     }
 
+    /// All figures of an image against another.
+    ///
+    /// # Errors
+    /// [`MetricsError`] where the sizes differ.
+    pub fn compare_images(&self, image: &[[f32; 3]], truth: &[[f32; 3]]) -> Result<Metrics, MetricsError> {
+        compare(
+            &self.image(image.to_vec()),
+            &self.image(truth.to_vec()),
+            Kind::Linear,
+            None,
+        )
+    }
+
+    /// SSIM of an image; not a number where it has none.
+    pub fn likeness(&self, image: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
+        self.compare_images(image, truth)
+            .ok()
+            .and_then(|m| m.ssim)
+            .unwrap_or(f64::NAN)
+    }
+
     /// Figures of an image.
     pub fn figures(&self, image: &[[f32; 3]], references: &References) -> Figures {
         let (rel_mse, rel_mse_trimmed) = references.error(image);

@@ -45,12 +45,29 @@ pub(super) struct FramesArgs {
     /// Measure again what an interrupted or earlier run of the same kind has left in the folder
     #[arg(long)]
     fresh: bool,
+    /// For fig7.N: eye and angles X,Y,Z,PITCH,YAW[,ROLL]
+    #[arg(
+        long,
+        value_name = "X,Y,Z,PITCH,YAW[,ROLL]",
+        allow_hyphen_values = true,
+        conflicts_with = "spawn"
+    )]
+    pub(super) camera: Option<String>,
+    /// For fig7.N: spawn point to look from
+    #[arg(long, value_name = "N")]
+    pub(super) spawn: Option<usize>,
     /// For fig7.1: the original's picture of the view, as tests/original_view.sh makes it
     #[arg(long, value_name = "FILE.png")]
     pub(super) original: Option<PathBuf>,
 }
 
 impl FramesArgs {
+    /// The experiment of the thesis that is asked for, and its maps.
+    pub(super) fn figure(&self) -> Option<(&str, &[String])> {
+        let (first, rest) = self.maps.split_first()?;
+        first.starts_with("fig").then_some((first.as_str(), rest))
+    }
+
     /// The maps asked for, or the usual ones that are there.
     pub(super) fn maps(&self, common: &Common) -> Result<Vec<String>, CliError> {
         usual_maps(common, &self.maps)

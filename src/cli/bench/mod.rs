@@ -2,6 +2,7 @@
 
 mod comparison;
 mod error;
+mod figures;
 mod frames;
 mod lights;
 mod pictures;
@@ -58,7 +59,10 @@ enum What {
 /// Runs a benchmark.
 pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
     let Some(what) = &args.what else {
-        return frames::run(common, cvars, &args.frames);
+        return match args.frames.figure() {
+            Some((name, maps)) => figures::run(common, cvars, &args.frames, name, maps),
+            None => frames::run(common, cvars, &args.frames),
+        };
     };
     match what {
         What::Error(args) => error::run(common, cvars, args),
