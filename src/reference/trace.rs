@@ -225,6 +225,8 @@ impl Tracer {
                     transform(&instance.world_to_object, direction, 0.0),
                 )
             };
+            // The tree tells a ray's octant by `< 0`, which −0 is not, though its inverse is −∞: such rays would miss all.
+            let d = d + Vec3::ZERO;
             let (od, dd) = (o.as_dvec3(), d.as_dvec3());
             let tree = &self.trees[instance.mesh as usize];
             // The tree's own limit is single precision: rounding it up keeps every hit that double precision accepts.
@@ -347,4 +349,25 @@ impl Tracer {
 /// The next larger single-precision number, so that limits never cut off what lies exactly at them.
 fn next_up(t: f64) -> f32 {
     (t as f32).next_up()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets::vfs::Vfs;
+    use crate::content::embedded::EMBEDDED;
+
+    /// A component of −0 is one of 0.
+    #[test]
+    fn rays_along_axes_hit_whatever_the_signs_of_their_zeros() {
+        let scene = Scene::load(&Vfs::mount(&[], EMBEDDED), "showcase").expect("the shipped map");
+        let tracer = Tracer::new(&scene);
+        let eye = Vec3::from(crate::scene::spawns::view(&scene.spawns[0], 90.0).eye);
+        let hit = |d: Vec3| tracer.closest(&scene, eye, d, f64::from(f32::MAX)).map(|h| h.t);
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+            let zeros = |zero: f32| Vec3::from(axis.to_array().map(|c| if c == 0.0 { zero } else { c }));
+            let found = hit(zeros(0.0));
+            assert!(found.is_some() && hit(zeros(-0.0)) == found, "{axis}: {found:?}");
+        }
+    }
 }
