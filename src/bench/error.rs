@@ -8,6 +8,7 @@ use super::statistics::{Line, Repeated, median, power_law};
 use super::sweep::{Config, sweep};
 use super::truth::Truth;
 use crate::metrics::{Kind, heatmap};
+use crate::output::stats::FrameStats;
 use crate::render::scene_gpu::{RenderError, SceneGpu};
 use crate::render::settings::Settings;
 use crate::scene::camera::Camera;
@@ -194,8 +195,7 @@ impl ErrorBench {
             stats.extend(stage.frame(camera, &settings, index, 1)?);
         }
         stats.extend(stage.realtime.finish()?);
-        let took = |s: &crate::output::stats::FrameStats| s.gpu_ms.unwrap_or(s.cpu_ms);
-        let once = stats.iter().map(took).fold(f64::INFINITY, f64::min);
+        let once = stats.iter().map(FrameStats::ms).fold(f64::INFINITY, f64::min);
         if once * f64::from(config.samples) > self.options.longest {
             return Ok(Err(once * f64::from(config.samples)));
         }
@@ -223,7 +223,7 @@ impl ErrorBench {
             ended.extend(stage.frame(camera, &settings, index, accumulated)?);
         }
         ended.extend(stage.realtime.finish()?);
-        times.extend(ended.iter().skip(TIMED as usize / 4).map(took));
+        times.extend(ended.iter().skip(TIMED as usize / 4).map(FrameStats::ms));
         Ok(Ok(Shown {
             config: *config,
             ms: median(&times).unwrap_or(once) * f64::from(config.samples),

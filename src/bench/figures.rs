@@ -217,10 +217,6 @@ pub struct SampleRow {
     pub traditional: (f64, f64),
 }
 
-fn took(s: &FrameStats) -> f64 {
-    s.gpu_ms.unwrap_or(s.cpu_ms)
-}
-
 /// Passes that denoise: figure 7.8.
 fn denoises(pass: &str) -> bool {
     [
@@ -249,7 +245,7 @@ pub fn show(stage: &mut Stage, camera: &Camera, panel: &Panel) -> Result<Shown, 
     }
     ended.extend(stage.realtime.finish()?);
     let timed = &ended[ended.len().saturating_sub(TIMED as usize)..];
-    let ms = median(&timed.iter().map(took).collect::<Vec<_>>()).unwrap_or(0.0);
+    let ms = median(&timed.iter().map(FrameStats::ms).collect::<Vec<_>>()).unwrap_or(0.0);
     let of_denoiser = |s: &FrameStats| {
         let passes = s.passes.iter().filter(|(name, _)| denoises(name));
         passes.filter_map(|(_, t)| t.as_f64()).sum::<f64>()
@@ -283,7 +279,7 @@ pub fn samples(stage: &mut Stage, camera: &Camera) -> Result<Vec<SampleRow>, Ren
                 ended.extend(stage.frame(camera, settings, index, 1)?);
             }
             ended.extend(stage.realtime.finish()?);
-            let ms = median(&ended.iter().map(took).collect::<Vec<_>>()).unwrap_or(0.0) * f64::from(samples);
+            let ms = median(&ended.iter().map(FrameStats::ms).collect::<Vec<_>>()).unwrap_or(0.0) * f64::from(samples);
             Ok((ms, stage.likeness(&image, &truth)))
         };
         out.push(SampleRow {

@@ -126,10 +126,6 @@ pub struct MapFrames {
     pub graph: Vec<f64>,
 }
 
-fn shown(stats: &FrameStats) -> f64 {
-    stats.gpu_ms.unwrap_or(stats.cpu_ms)
-}
-
 fn passes_of<'a>(frames: impl Iterator<Item = &'a FrameTime>) -> BTreeMap<String, Vec<f64>> {
     let mut out: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for frame in frames {
@@ -142,7 +138,7 @@ fn passes_of<'a>(frames: impl Iterator<Item = &'a FrameTime>) -> BTreeMap<String
 
 impl RunReport {
     fn of(frames: &[FrameTime]) -> Self {
-        let times: Vec<f64> = frames.iter().map(|f| shown(&f.stats)).collect();
+        let times: Vec<f64> = frames.iter().map(|f| f.stats.ms()).collect();
         let summary = Summary::of(times.clone());
         let cpu: Vec<f64> = frames.iter().map(|f| f.stats.cpu_ms).collect();
         let wall: Vec<f64> = frames.iter().map(|f| f.wall_ms).collect();
@@ -227,7 +223,7 @@ pub fn run(
     report.memory = scene.device.memory_allocated();
     report.runs = all.iter().map(|frames| RunReport::of(frames)).collect();
     let flat = || all.iter().flatten();
-    let times: Vec<f64> = flat().map(|f| shown(&f.stats)).collect();
+    let times: Vec<f64> = flat().map(|f| f.stats.ms()).collect();
     report.summary = Summary::of(times.clone());
     report.stutters = stutters(&times, report.summary.p50);
     let of_runs = |f: &dyn Fn(&RunReport) -> f64| Repeated::of(&report.runs.iter().map(f).collect::<Vec<_>>());
@@ -252,6 +248,6 @@ pub fn run(
         shadow: mean(&|s| s.rays.shadow),
         shadow_skipped: mean(&|s| s.rays.shadow_skipped),
     };
-    report.graph = all.first().into_iter().flatten().map(|f| shown(&f.stats)).collect();
+    report.graph = all.first().into_iter().flatten().map(|f| f.stats.ms()).collect();
     Ok((report, all))
 }

@@ -2,13 +2,8 @@
 
 use super::lights::{MapReport, Mode};
 use super::lights_report::LightsReport;
+use super::plot::PlotError;
 use plotters::prelude::*;
-use thiserror::Error;
-
-/// The picture could not be drawn.
-#[derive(Debug, Error)]
-#[error("cannot draw the plot: {0}")]
-pub struct PlotError(String);
 
 /// Size of a panel, pixels.
 const PANEL: (u32, u32) = (300, 240);
@@ -51,22 +46,21 @@ fn front(map: &MapReport, mode: Mode) -> Vec<(f64, f64)> {
 /// # Errors
 /// [`PlotError`] where the drawing library fails.
 pub fn svg(report: &LightsReport) -> Result<String, PlotError> {
-    let fail = |e: &dyn std::fmt::Display| PlotError(e.to_string());
     let rows = (report.maps.len() as u32).div_ceil(COLUMNS).max(1);
     let mut text = String::new();
     {
         let size = (PANEL.0 * COLUMNS, PANEL.1 * rows + LEGEND);
         let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        root.fill(&WHITE).map_err(|e| fail(&e))?;
+        root.fill(&WHITE).map_err(PlotError::of)?;
         let (legend, panels) = root.split_vertically(LEGEND);
         for (i, mode) in Mode::ALL.into_iter().enumerate() {
             let x = 20 + i as i32 * 130;
             legend
                 .draw(&Rectangle::new([(x, 14), (x + 18, 24)], colour(mode).filled()))
-                .map_err(|e| fail(&e))?;
+                .map_err(PlotError::of)?;
             legend
                 .draw(&Text::new(mode.name(), (x + 24, 12), ("sans-serif", 15)))
-                .map_err(|e| fail(&e))?;
+                .map_err(PlotError::of)?;
         }
         let areas = panels.split_evenly((rows as usize, COLUMNS as usize));
         for (map, area) in report.maps.iter().zip(&areas) {
@@ -84,7 +78,7 @@ pub fn svg(report: &LightsReport) -> Result<String, PlotError> {
                 .x_label_area_size(28)
                 .y_label_area_size(46)
                 .build_cartesian_2d(span(|p| p.0).log_scale(), span(|p| p.1).log_scale())
-                .map_err(|e| fail(&e))?;
+                .map_err(PlotError::of)?;
             chart
                 .configure_mesh()
                 .light_line_style(WHITE)
@@ -94,18 +88,18 @@ pub fn svg(report: &LightsReport) -> Result<String, PlotError> {
                 .y_labels(6)
                 .y_label_formatter(&|v| format!("{v:.0e}"))
                 .draw()
-                .map_err(|e| fail(&e))?;
+                .map_err(PlotError::of)?;
             for mode in Mode::ALL {
                 let points = front(map, mode);
                 chart
                     .draw_series(LineSeries::new(points.iter().copied(), colour(mode).stroke_width(2)))
-                    .map_err(|e| fail(&e))?;
+                    .map_err(PlotError::of)?;
                 chart
                     .draw_series(points.iter().map(|p| Circle::new(*p, 2, colour(mode).filled())))
-                    .map_err(|e| fail(&e))?;
+                    .map_err(PlotError::of)?;
             }
         }
-        root.present().map_err(|e| fail(&e))?;
+        root.present().map_err(PlotError::of)?;
     }
     Ok(text)
 }

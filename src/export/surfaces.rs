@@ -3,6 +3,7 @@
 use super::ExportError;
 use super::document::Document;
 use super::materials::{Emitter, Materials, kind};
+use crate::reference::surface::normal_to_world;
 use crate::reference::trace::{Tracer, point_to_world};
 use crate::scene::Scene;
 use crate::scene::records::{
@@ -94,12 +95,6 @@ fn collect(
         out.uvs
             .push(scene.geometry.attributes[triangle.vertices[k] as usize].uv);
     }
-}
-
-fn normal_to_world(instance: &Instance, n: Vec3) -> Vec3 {
-    let m = &instance.world_to_object;
-    let column = |i: usize| m[0][i] * n.x + m[1][i] * n.y + m[2][i] * n.z;
-    Vec3::new(column(0), column(1), column(2))
 }
 
 fn add_group(

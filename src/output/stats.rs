@@ -70,7 +70,14 @@ impl Summary {
 
     /// Over frames.
     pub fn of_frames(frames: &[FrameStats]) -> Self {
-        Self::of(frames.iter().map(|f| f.gpu_ms.unwrap_or(f.cpu_ms)).collect())
+        Self::of(frames.iter().map(FrameStats::ms).collect())
+    }
+}
+
+impl FrameStats {
+    /// Time on the GPU where that is known, else on the CPU, milliseconds.
+    pub fn ms(&self) -> f64 {
+        self.gpu_ms.unwrap_or(self.cpu_ms)
     }
 }
 

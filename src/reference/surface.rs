@@ -75,7 +75,8 @@ impl SurfaceHit {
     }
 }
 
-fn normal_to_world(instance: &Instance, n: Vec3) -> Vec3 {
+/// Object-space normal to world space, of any length.
+pub fn normal_to_world(instance: &Instance, n: Vec3) -> Vec3 {
     if instance.identity == 1 {
         return n;
     }

@@ -48,7 +48,7 @@ fn contents(ui: &mut egui::Ui, facts: &Facts<'_>) {
         ),
     );
     let frames: Vec<&FrameStats> = facts.recent.into_iter().flatten().collect();
-    let times: Vec<f64> = frames.iter().map(|f| f.gpu_ms.unwrap_or(f.cpu_ms)).collect();
+    let times: Vec<f64> = frames.iter().map(|f| f.ms()).collect();
     let s = Summary::of(times.clone());
     line(
         ui,
@@ -115,7 +115,7 @@ fn graph(ui: &mut egui::Ui, times: &[f64], p95: f64) {
 
 fn rays(ui: &mut egui::Ui, frames: &[&FrameStats]) {
     let sum = |count: fn(&FrameStats) -> u64| frames.iter().map(|f| count(f)).sum::<u64>() as f64;
-    let seconds = frames.iter().map(|f| f.gpu_ms.unwrap_or(f.cpu_ms)).sum::<f64>() / 1e3;
+    let seconds = frames.iter().map(|f| f.ms()).sum::<f64>() / 1e3;
     let (primary, shadow, skipped) = (
         sum(|f| f.rays.primary),
         sum(|f| f.rays.shadow),

@@ -16,7 +16,7 @@ use crate::bench::stage::Stage;
 use crate::bench::tour::Tour;
 use crate::console::Cvars;
 use crate::console::settings::settings;
-use crate::engine::{Engine, Prepared};
+use crate::engine::Prepared;
 use crate::output::{atomic, png_file, stdout};
 use crate::reference::trace::Tracer;
 use crate::render::realtime::Realtime;
@@ -82,7 +82,6 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &FramesArgs, name: &str,
         write(&args.out.join("report.html"), &page.html())?;
     }
     bar.finish_and_clear();
-    debug_assert!(matches!(engine, Engine::Vulkan { .. }));
     stdout::line(args.out.join("report.html").display()).map_err(CliError::failed)
 }
 
@@ -209,10 +208,7 @@ impl Making<'_> {
         let settings = (panel.change)(settings(self.cvars));
         let way = Way::of_cameras("tour", &tour, settings.clock);
         let frames = go(&mut realtime, &settings, &way, 4, &|| {}).map_err(CliError::failed)?;
-        let times: Vec<f64> = frames
-            .iter()
-            .map(|f| f.stats.gpu_ms.unwrap_or(f.stats.cpu_ms))
-            .collect();
+        let times: Vec<f64> = frames.iter().map(|f| f.stats.ms()).collect();
         let series = [Series {
             name: panel.label.to_owned(),
             points: times.iter().enumerate().map(|(i, t)| (i as f64, *t)).collect(),
