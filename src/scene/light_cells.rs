@@ -12,7 +12,7 @@ use glam::Vec3;
 pub const CELL_SIZE: f32 = 128.0;
 /// The place of a receiver is taken this far off its surface, units: walls stand on whole units and often on the cubes'
 /// borders, where rounding would tell one side from the other.
-const LIFT: f32 = 5.37;
+pub const LIFT: f32 = 5.37;
 /// Bits of a cube's x and y, and of its z; coordinates that differ by more share cubes.
 const BITS_XY: u32 = 10;
 const BITS_Z: u32 = 9;
