@@ -390,7 +390,9 @@ fn records() -> Vec<Record> {
             guest_count,
             draw_sun,
             secondary_levels,
-            white
+            white,
+            solo_light,
+            light_term
         }),
         record!(Push {
             frame,

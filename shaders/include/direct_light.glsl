@@ -5,6 +5,13 @@
 
 #include "luminance.glsl"
 
+// What a light sample is shown by: rt_lightTerm.
+const uint TERM_VISIBILITY = 1;
+const uint TERM_GEOMETRY = 2;
+const uint TERM_EMISSION = 3;
+// FC.solo_light of a number that no light has; NONE: all lights.
+const uint NO_SUCH_LIGHT = 0xfffffffeu;
+
 // Number of the sample whose random numbers are drawn: the frame's, or the one that is shaded again.
 uint drawn_index;
 
@@ -50,8 +57,11 @@ vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
         counts.y++;
         return vec3(0.0);
     }
+    if (FC.light_term == TERM_GEOMETRY) return vec3(s.geometry);
+    if (FC.light_term == TERM_EMISSION) return s.value / s.geometry;
     counts.x++;
-    return visible(offset_point(at.position, at.geometric_normal), s) * s.value;
+    vec3 arrives = visible(offset_point(at.position, at.geometric_normal), s);
+    return FC.light_term == TERM_VISIBILITY ? arrives : arrives * s.value;
 }
 
 // Lights sampled by all ways in one loop: what is chosen differs, not how it is sampled and traced. Compilers copy a function
@@ -59,9 +69,11 @@ vec3 traced(LightSample s, SurfaceHit at, inout uvec2 counts) {
 vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     Chances chances = chances_at(at);
     LightRow row = chances.row;
-    bool every = FC.random_lights == 0;
+    bool solo = FC.solo_light != NONE;
+    bool every = solo || FC.random_lights == 0;
     bool resampled = !every && FC.light_sampling == SAMPLING_RESERVOIR;
     uint count = every ? row.light_count + FC.guest_count : FC.random_lights;
+    if (solo) count = FC.solo_light == NO_SUCH_LIGHT ? 0 : 1;
     // One light of several candidates is kept in proportion to what each gives without visibility.
 #ifdef LIGHTS_LOBES
     // What branches off is not denoised.
@@ -78,13 +90,13 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     uint first = 0;
 #ifdef LIGHTS_LOBES
     lobe_light = vec3(0.0);
-    if (light_lobe.alpha > 0.0) count++;
+    if (light_lobe.alpha > 0.0 && FC.solo_light != NO_SUCH_LIGHT) count++;
     if (lobe_alone) first = diffuse_count;
 #endif
     [[dont_unroll]] for (uint i = first; i < count; i++) {
         bool for_lobe = i == diffuse_count;
         Choice picked = NO_CHOICE;
-        LightSample kept = LightSample(vec3(0.0), vec3(0.0), false);
+        LightSample kept = LightSample(vec3(0.0), 0.0, vec3(0.0), false);
         float kept_target = 0.0;
         float weights = 0.0;
         [[dont_unroll]] for (uint c = 0; c < (for_lobe ? 1 : n); c++) {
@@ -96,12 +108,16 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
             if (for_lobe) {
                 choice = choose_for_lobe(row, lobe_cell(at.row, light_cell_place(at.position, at.geometric_normal)),
                                          random_bits(address, DIM_LOBE_PICK).x);
+                if (solo) choice = Choice(FC.solo_light, 1.0);
                 if (choice.light == NONE) continue;
                 dimension = DIM_LOBE_POINT;
                 if (points == POINTS_SOLID_ANGLE) points = POINTS_AREA;
             } else
 #endif
-            if (every && i >= row.light_count) {
+            if (solo) {
+                choice = Choice(FC.solo_light, 1.0);
+                dimension = DIM_EVERY_LIGHT + choice.light;
+            } else if (every && i >= row.light_count) {
                 choice.light = GUEST_LIGHT + (i - row.light_count);
                 choice.probability = 1.0;
                 dimension = DIM_EVERY_LIGHT + choice.light;

@@ -42,6 +42,8 @@ const float LARGE_SOLID_ANGLE = 0.3;
 struct LightSample {
     // Contribution to irradiance/π without visibility; zero where there is none.
     vec3 value;
+    // Its part that is not the radiance which leaves the light: cosines, distance and the pdf of the position.
+    float geometry;
     // Point, or direction to the sky.
     vec3 target;
     bool sky;
@@ -192,28 +194,31 @@ TrianglePoint triangle_point(Light light, SurfaceHit at, vec2 u, uint points) {
 }
 
 LightSample sample_triangle_light(Light light, SurfaceHit at, vec2 u, uint points) {
-    LightSample r = LightSample(vec3(0.0), vec3(0.0), false);
+    LightSample r = LightSample(vec3(0.0), 0.0, vec3(0.0), false);
     TrianglePoint p = triangle_point(light, at, u, points);
     if (!(p.factor > 0.0)) return r;
     if (light.kind == LIGHT_DOME) {
         if ((light.flags & LIGHT_EVEN) != 0) {
             r.value = light.radiance * p.factor;
+            r.geometry = p.factor;
             r.target = offset_point(p.position, p.normal);
             return r;
         }
         if (p.direction.z <= 0.0) return r;
         float cos_elevation = sqrt(max(1.0 - p.direction.z * p.direction.z, 1e-8));
-        r.value = light.radiance * (p.factor / (PI * cos_elevation));
+        r.geometry = p.factor / (PI * cos_elevation);
+        r.value = light.radiance * r.geometry;
     } else {
         vec2 uv = uv_at(light.triangle, p.barycentrics);
         r.value = emitted(FC.materials.at[light.material], uv, p.position, p.direction) * (p.factor * light.scale);
+        r.geometry = p.factor;
     }
     r.target = offset_point(p.position, p.normal);
     return r;
 }
 
 LightSample sample_sphere_light(Light light, SurfaceHit at, vec2 u, bool soft) {
-    LightSample r = LightSample(vec3(0.0), vec3(0.0), false);
+    LightSample r = LightSample(vec3(0.0), 0.0, vec3(0.0), false);
     vec3 to_centre = light.p0 - at.position;
     float d2 = dot(to_centre, to_centre);
     float r2 = light.size * light.size;
@@ -239,23 +244,25 @@ LightSample sample_sphere_light(Light light, SurfaceHit at, vec2 u, bool soft) {
     if (cosine <= 0.0) return r;
     if ((light.flags & LIGHT_NO_COSINE) != 0) cosine = 1.0;
     if ((light.flags & LIGHT_LINEAR) != 0) {
-        r.value = light.radiance * (max(light.p2.z - d * light.p2.y, 0.0) * cosine);
+        r.geometry = max(light.p2.z - d * light.p2.y, 0.0) * cosine;
     } else {
-        r.value = light.radiance * (2.0 * cone * cosine);
+        r.geometry = 2.0 * cone * cosine;
     }
     if ((light.flags & LIGHT_SPOT) != 0) {
         float along = -dot(to_centre, light.p1);
         float off = length(-to_centre - light.p1 * along);
         float edge = along > 0.0 ? (light.p2.x * along - off) / 32.0 : 0.0;
-        r.value *= clamp(edge, 0.0, 1.0);
+        r.geometry *= clamp(edge, 0.0, 1.0);
     }
+    r.value = light.radiance * r.geometry;
     r.target = at.position + direction * reach;
     return r;
 }
 
 LightSample sky_sample(SurfaceHit at, float azimuth, float elevation, vec3 value) {
     vec3 direction = vec3(cos(azimuth) * cos(elevation), sin(azimuth) * cos(elevation), sin(elevation));
-    return LightSample(value * receiver_cosine(at, direction), direction, true);
+    float cosine = receiver_cosine(at, direction);
+    return LightSample(value * cosine, cosine, direction, true);
 }
 
 LightSample sample_light(Light light, SurfaceHit at, vec2 u, uint points) {

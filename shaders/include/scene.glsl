@@ -461,6 +461,8 @@ struct FrameConstants {
     uint draw_sun;
     uint secondary_levels;
     uint white;
+    uint solo_light;
+    uint light_term;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Frame { FrameConstants constants; };

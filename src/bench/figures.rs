@@ -1,4 +1,5 @@
-//! The experiments of the thesis by their names: figures 7.1 to 7.14 of its evaluation, on any map.
+//! The experiments of the thesis by their names: figures 7.1 to 7.14 of its evaluation, and the worst case of its section 7.5,
+//! on any map.
 
 use super::stage::Stage;
 use super::statistics::median;
@@ -6,12 +7,16 @@ use crate::bench::lights::Mode;
 use crate::bench::sweep::Config;
 use crate::output::stats::FrameStats;
 use crate::render::scene_gpu::RenderError;
-use crate::render::settings::{Secondary, Settings};
+use crate::render::settings::{AmbientLight, LightTerm, Secondary, Settings};
 use crate::scene::camera::Camera;
 use serde::Serialize;
 
 /// Sizes of displays: figures 7.7 to 7.9.
 pub const SIZES: [(u32, u32); 3] = [(1280, 720), (1920, 1080), (2560, 1440)];
+/// The experiment of the thesis that shows one light alone.
+pub const SOLO: &str = "fig7.12";
+/// The experiment of the thesis's section 7.5, which wants a view of glass.
+pub const GLASS: &str = "sec7.5";
 /// Samples whose mean is the ground truth, as in the thesis.
 pub const TRUTH: u32 = 1500;
 /// Numbers of samples of figures 7.10 and 7.11.
@@ -25,8 +30,8 @@ const TIMED: u32 = 16;
 pub enum Show {
     /// As it is shown after some frames.
     Frame,
-    /// The mean of so many samples.
-    Mean(u32),
+    /// The mean of many samples.
+    Truth,
 }
 
 /// One picture of a figure.
@@ -37,6 +42,8 @@ pub struct Panel {
     pub change: fn(Settings) -> Settings,
     /// Steps towards what is under the crosshair, as a share of the way there.
     pub closer: f32,
+    /// Shows something else than the truth does.
+    pub apart: bool,
 }
 
 /// What a figure is made of.
@@ -57,6 +64,7 @@ const fn panel(label: &'static str, show: Show, change: fn(Settings) -> Settings
         show,
         change,
         closer: 0.0,
+        apart: false,
     }
 }
 
@@ -94,9 +102,42 @@ fn unculled(s: Settings) -> Settings {
 const ALL: Panel = panel("all lights", Show::Frame, all);
 const ONE: Panel = panel("one light", Show::Frame, one);
 const DENOISED: Panel = panel("one light, denoiser", Show::Frame, one_denoised);
-const ACCUMULATED: Panel = panel("1500 samples of all lights", Show::Mean(TRUTH), all);
+const ACCUMULATED: Panel = panel("truth, all lights", Show::Truth, all);
 
-/// The figure of a name; `None` for others. 7.12 wants lights alone and terms alone, which no setting gives yet.
+fn without_secondary(s: Settings) -> Settings {
+    Settings {
+        secondary: Secondary::Off,
+        ..s
+    }
+}
+
+/// One sample of light alone, of all lights or of one.
+fn alone(s: Settings, light_term: LightTerm, solo_light: Option<u32>) -> Settings {
+    Settings {
+        solo_light,
+        light_term,
+        white: true,
+        ambient: AmbientLight::Off,
+        ..one(s)
+    }
+}
+
+const fn term(label: &'static str, change: fn(Settings) -> Settings) -> Panel {
+    Panel {
+        apart: true,
+        ..panel(label, Show::Frame, change)
+    }
+}
+
+const fn nearer(label: &'static str, closer: f32) -> Panel {
+    Panel {
+        closer,
+        apart: true,
+        ..panel(label, Show::Frame, |s| s)
+    }
+}
+
+/// The figure of a name; `None` for others.
 pub fn figure(name: &str) -> Option<(&'static str, Figure)> {
     Some(match name {
         "fig7.1" => (
@@ -141,10 +182,7 @@ pub fn figure(name: &str) -> Option<(&'static str, Figure)> {
         "fig7.5" => (
             "what is seen through glass, without the secondary stage and with it",
             Figure::Pictures(vec![
-                panel("secondary stage off", Show::Frame, |s| Settings {
-                    secondary: Secondary::Off,
-                    ..s
-                }),
+                panel("secondary stage off", Show::Frame, without_secondary),
                 panel("secondary stage on", Show::Frame, |s| s),
             ]),
         ),
@@ -178,6 +216,25 @@ pub fn figure(name: &str) -> Option<(&'static str, Figure)> {
             ]),
         ),
         "fig7.11" => ("time and likeness against samples", Figure::Samples),
+        // The stage's settings name the light.
+        SOLO => (
+            "where noise comes from: one light alone, and the terms of its light",
+            Figure::Pictures(vec![
+                Panel {
+                    apart: true,
+                    ..panel("one light of all", Show::Frame, |s| alone(s, LightTerm::All, None))
+                },
+                panel("the light alone", Show::Frame, |s| {
+                    alone(s, LightTerm::All, s.solo_light)
+                }),
+                term("its visibility", |s| alone(s, LightTerm::Visibility, s.solo_light)),
+                term("its geometry", |s| alone(s, LightTerm::Geometry, s.solo_light)),
+                term("its emission", |s| alone(s, LightTerm::Emission, s.solo_light)),
+                panel("truth, the light alone", Show::Truth, |s| {
+                    alone(s, LightTerm::All, s.solo_light)
+                }),
+            ]),
+        ),
         "fig7.13" => (
             "frame time on a walk with all lights",
             Figure::Walk(panel("all lights", Show::Frame, all)),
@@ -187,10 +244,25 @@ pub fn figure(name: &str) -> Option<(&'static str, Figure)> {
             Figure::Pictures(vec![
                 Panel {
                     closer: 0.6,
+                    apart: true,
                     ..panel("near, denoiser", Show::Frame, one_denoised)
                 },
                 panel("far, denoiser", Show::Frame, one_denoised),
-                panel("far, 1500 samples", Show::Mean(TRUTH), all),
+                panel("far, truth", Show::Truth, all),
+            ]),
+        ),
+        // The thesis's section 7.5: frames take longest where glass fills the view.
+        GLASS => (
+            "up to the glass",
+            Figure::Pictures(vec![
+                nearer("from where all of it is seen", 0.0),
+                nearer("half way", 0.5),
+                nearer("at the glass", 0.95),
+                Panel {
+                    closer: 0.95,
+                    apart: true,
+                    ..panel("at the glass, secondary stage off", Show::Frame, without_secondary)
+                },
             ]),
         ),
         _ => return None,
@@ -231,11 +303,11 @@ fn denoises(pass: &str) -> bool {
     .any(|p| pass.starts_with(p))
 }
 
-/// Renders a panel.
+/// Renders a panel; a truth is the mean of `truth` samples.
 ///
 /// # Errors
 /// [`RenderError`] of the device.
-pub fn show(stage: &mut Stage, camera: &Camera, panel: &Panel) -> Result<Shown, RenderError> {
+pub fn show(stage: &mut Stage, camera: &Camera, panel: &Panel, truth: u32) -> Result<Shown, RenderError> {
     let settings = (panel.change)(stage.base);
     stage.frame(camera, &settings, 0, 1)?;
     let frames = if settings.denoiser || settings.taa { SETTLE } else { 1 };
@@ -253,7 +325,7 @@ pub fn show(stage: &mut Stage, camera: &Camera, panel: &Panel) -> Result<Shown, 
     let denoiser_ms = median(&timed.iter().map(of_denoiser).collect::<Vec<_>>()).unwrap_or(0.0);
     let pixels = match panel.show {
         Show::Frame => stage.shown()?,
-        Show::Mean(samples) => stage.accumulated(camera, &settings, samples)?,
+        Show::Truth => stage.accumulated(camera, &settings, truth)?,
     };
     Ok(Shown {
         pixels,
@@ -262,12 +334,12 @@ pub fn show(stage: &mut Stage, camera: &Camera, panel: &Panel) -> Result<Shown, 
     })
 }
 
-/// Figure 7.11: SSIM against the mean of [`TRUTH`] samples of all lights.
+/// Figure 7.11: SSIM against the mean of `truth` samples of all lights.
 ///
 /// # Errors
 /// [`RenderError`] of the device.
-pub fn samples(stage: &mut Stage, camera: &Camera) -> Result<Vec<SampleRow>, RenderError> {
-    let truth = show(stage, camera, &ACCUMULATED)?.pixels;
+pub fn samples(stage: &mut Stage, camera: &Camera, truth: u32) -> Result<Vec<SampleRow>, RenderError> {
+    let truth = show(stage, camera, &ACCUMULATED, truth)?.pixels;
     let mut out = Vec::new();
     for n in SAMPLES {
         let several = lights(stage.base, Mode::Uniform, n, false, false);
@@ -296,10 +368,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_but_one_figure_are_there() {
+    fn all_figures_are_there() {
         for n in 1..=14 {
-            assert_eq!(figure(&format!("fig7.{n}")).is_some(), n != 12, "{n}");
+            assert!(figure(&format!("fig7.{n}")).is_some(), "{n}");
         }
         assert!(figure("fig7.15").is_none());
+        assert!(figure(GLASS).is_some());
     }
 }

@@ -5,7 +5,7 @@
 //! so that the references' own noise is no floor. Anti-aliasing is off on both sides: only light is left to chance. Time is
 //! the GPU's for the passes that light the surfaces.
 
-use super::references::{Pixels, References, mean};
+use super::references::{Pixels, References, mean, reference_seed};
 use crate::gpu::{GpuError, SubmitSync};
 use crate::output::stats::FrameStats;
 use crate::render::frame::FrameInput;
@@ -230,7 +230,7 @@ impl LightsBench {
         let mut images = [Vec::new(), Vec::new()];
         for (i, image) in images.iter_mut().enumerate() {
             let settings = Settings {
-                seed: self.base.seed.wrapping_add(0x51ed_0001 + i as u32),
+                seed: reference_seed(self.base.seed, i),
                 ..REFERENCE.settings(&self.base)
             };
             for n in 0..self.options.references {

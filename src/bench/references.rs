@@ -13,6 +13,11 @@ pub struct References {
     pub mean: f64,
 }
 
+/// Seed of a reference or truth, apart from those of the images that it judges.
+pub fn reference_seed(base: u32, number: usize) -> u32 {
+    base.wrapping_add(0x51ed_0001 + number as u32)
+}
+
 /// Mean over pixels and channels.
 pub fn mean(pixels: &[[f32; 3]]) -> f64 {
     let sum: f64 = pixels.iter().flatten().map(|v| f64::from(*v)).sum();

@@ -1,7 +1,7 @@
 //! What benchmarks of the picture have in common: frames of a scene as they are shown, and references of them.
 
 use super::lights::REFERENCE;
-use super::references::{Pixels, References, mean};
+use super::references::{Pixels, References, mean, reference_seed};
 use crate::gpu::SubmitSync;
 use crate::metrics::{ImageRgb, Kind, Metrics, MetricsError, compare};
 use crate::output::stats::FrameStats;
@@ -138,7 +138,7 @@ impl Stage {
         let mut images = [Vec::new(), Vec::new()];
         for (i, image) in images.iter_mut().enumerate() {
             let settings = Settings {
-                seed: self.base.seed.wrapping_add(0x51ed_0001 + i as u32),
+                seed: reference_seed(self.base.seed, i),
                 ..REFERENCE.settings(&self.base)
             };
             *image = self.accumulated(camera, &settings, self.references)?;

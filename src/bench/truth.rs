@@ -4,7 +4,7 @@
 //! truths, and half the difference between what the parts of one give is a sample of the deviation that it causes.
 
 use super::lights::REFERENCE;
-use super::references::{Pixels, References, mean};
+use super::references::{Pixels, References, mean, reference_seed};
 use super::stage::Stage;
 use crate::output::checksum::fnv1a;
 use crate::output::{OutputError, exr_file};
@@ -45,14 +45,10 @@ fn halfway(a: &Pixels, b: &Pixels) -> Pixels {
         .collect()
 }
 
-fn seed(base: u32, truth: usize) -> u32 {
-    base.wrapping_add(0x51ed_0001 + truth as u32)
-}
-
 /// The samples `range` of a truth, averaged.
 fn part(stage: &mut Stage, camera: &Camera, truth: usize, range: std::ops::Range<u32>) -> Result<Pixels, RenderError> {
     let settings = Settings {
-        seed: seed(stage.base.seed, truth),
+        seed: reference_seed(stage.base.seed, truth),
         ..REFERENCE.settings(&stage.base)
     };
     stage.accumulated_from(camera, &settings, range)

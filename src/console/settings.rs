@@ -2,7 +2,7 @@
 
 use super::Cvars;
 use crate::lighting::Lights;
-use crate::render::settings::{AmbientLight, LightSampling, Secondary, Settings, ShownEmission, Tonemap};
+use crate::render::settings::{AmbientLight, LightSampling, LightTerm, Secondary, Settings, ShownEmission, Tonemap};
 use crate::scene::clock::Clock;
 use crate::scene::sampling::Sequence;
 
@@ -24,6 +24,13 @@ pub fn settings(cvars: &Cvars) -> Settings {
     let on = |name| number(name) != 0.0;
     Settings {
         illumination: on("rt_illumination"),
+        solo_light: (number("rt_soloLight") >= 0.0).then(|| number("rt_soloLight") as u32),
+        light_term: match number("rt_lightTerm") as u32 {
+            0 => LightTerm::All,
+            1 => LightTerm::Visibility,
+            2 => LightTerm::Geometry,
+            _ => LightTerm::Emission,
+        },
         cull_lights: number("rt_cullLights") as u32,
         random_lights: number("rt_numRandomDL") as u32,
         light_sampling: match number("rt_lightSampling") as u32 {

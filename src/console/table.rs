@@ -157,6 +157,18 @@ pub const CVARS: &[Cvar] = &[
         "lights sampled at random per hit for direct light; 0 samples all of them",
     ),
     int(
+        "rt_soloLight",
+        -1,
+        -1,
+        1_000_000,
+        "the number of the one light that lights; -1: all of them",
+    ).momentary(),
+    choice(
+        "rt_lightTerm",
+        &["all", "visibility", "geometry", "emission"],
+        "shows light by one of the terms whose product it is: the share that arrives, cosines and distance, what leaves the light",
+    ).momentary(),
+    int(
         "rt_softshadows",
         1,
         0,

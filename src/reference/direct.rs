@@ -1,13 +1,15 @@
 //! Direct light by next-event estimation. Counterpart of `shaders/direct.comp`.
 
 use super::branches::shown_over_lit;
-use super::light_choice::{Chances, LobeChances};
+use super::light_choice::{Chances, Choice, LobeChances};
 use super::light_sample::{LightSample, PointSampling, Target, sample_light};
-use super::surface::{SurfaceHit, offset_point};
+use super::renderer::CpuRenderer;
+use super::surface::{SurfaceHit, classify, offset_point};
 use super::trace::Tracer;
 use super::visibility::visible;
-use crate::render::settings::{LightSampling, Settings, ShownEmission};
+use crate::render::settings::{LightSampling, LightTerm, Settings, ShownEmission};
 use crate::scene::Scene;
+use crate::scene::camera::Camera;
 use crate::scene::clusters::LightLists;
 use crate::scene::guests::GUEST_LIGHT;
 use crate::scene::light_cells::place;
@@ -74,6 +76,12 @@ pub fn direct_light(
 ) -> Vec3 {
     let estimator = Estimator::new(scene, tracer, settings, at, address);
     let (lists, row) = light_row(scene, settings, at.row);
+    if let Some(light) = settings.solo_light {
+        return match (light as usize) < scene.lights.lights.len() {
+            true => estimator.one(light, DIM_EVERY_LIGHT + light, 1.0, counts),
+            false => Vec3::ZERO,
+        };
+    }
     if settings.random_lights == 0 {
         let guests = (0..tracer.guests.len() as u32).map(|g| GUEST_LIGHT + g);
         return lists
@@ -119,6 +127,37 @@ pub fn taken_sample(
     estimator.taken(&estimator.chances(), i, steps)
 }
 
+/// The light that gives most to what a camera sees, by a few samples of a small image; 0 where none gives anything.
+pub fn strongest_light(scene: &Scene, camera: &Camera) -> u32 {
+    const SIZE: (u32, u32) = (48, 27);
+    const SAMPLES: u32 = 8;
+    let settings = Settings::default();
+    let tracer = Tracer::new(scene);
+    let aovs = CpuRenderer::new(scene).aovs(camera, SIZE, &settings);
+    let mut given = vec![0.0; scene.lights.lights.len()];
+    for (pixel, (position, normal)) in (0u32..).zip(aovs.position.iter().zip(&aovs.geo_normal)) {
+        let (position, normal) = (Vec3::from(*position), Vec3::from(*normal));
+        if normal == Vec3::ZERO {
+            continue;
+        }
+        let (_, row) = classify(scene, position, normal, scene.rows.all_row);
+        let at = SurfaceHit::receiver(position, normal, row);
+        for index in 0..SAMPLES {
+            let address = SampleAddress { pixel, index };
+            let taken = taken_sample(scene, &tracer, &settings, &at, address, 0, 0);
+            let Some((taken, sample)) = taken.and_then(|t| Some((t, t.sample?))) else {
+                continue;
+            };
+            let arrives = visible(scene, &tracer, offset_point(position, normal), &sample);
+            if let Some(sum) = given.get_mut(taken.light as usize) {
+                *sum += luminance((sample.value * arrives).into()) * taken.weight;
+            }
+        }
+    }
+    let most = given.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    most.map_or(0, |(light, _)| light as u32)
+}
+
 /// Radiance over Fresnel's factor that a surface's lobe reflects of one light, sampled by area; lights
 /// that the lobe's own directions find, too, are weighted by the balance heuristic.
 pub fn lobe_light(
@@ -138,7 +177,14 @@ pub fn lobe_light(
     };
     let (lists, row) = light_row(scene, settings, at.row);
     let chances = LobeChances::new(scene, settings, lists, row, place(at.position, at.geometric_normal));
-    let Some(choice) = chances.choose(estimator.bits(DIM_LOBE_PICK)[0]) else {
+    let choice = match settings.solo_light {
+        None => chances.choose(estimator.bits(DIM_LOBE_PICK)[0]),
+        Some(light) => ((light as usize) < scene.lights.lights.len()).then_some(Choice {
+            light,
+            probability: 1.0,
+        }),
+    };
+    let Some(choice) = choice else {
         return Vec3::ZERO;
     };
     let Some(sample) = estimator.sample(choice.light, DIM_LOBE_POINT) else {
@@ -226,9 +272,18 @@ impl<'a> Estimator<'a> {
             counts.shadow_skipped += 1;
             return Vec3::ZERO;
         };
+        match self.settings.light_term {
+            LightTerm::Geometry => return Vec3::splat(sample.geometry * weight),
+            LightTerm::Emission => return sample.value / sample.geometry * weight,
+            LightTerm::All | LightTerm::Visibility => {}
+        }
         counts.shadow += 1;
         let origin = offset_point(self.at.position, self.at.geometric_normal);
-        sample.value * visible(self.scene, self.tracer, origin, &sample) * weight
+        let arrives = visible(self.scene, self.tracer, origin, &sample) * weight;
+        match self.settings.light_term {
+            LightTerm::Visibility => arrives,
+            _ => sample.value * arrives,
+        }
     }
 
     /// Contribution of one light, times a weight.

@@ -28,6 +28,8 @@ pub enum Target {
 pub struct LightSample {
     /// Contribution to irradiance/π if nothing is in the way.
     pub value: Vec3,
+    /// Its part that is not the radiance which leaves the light: cosines, distance and the pdf of the position.
+    pub geometry: f32,
     pub target: Target,
 }
 
@@ -259,6 +261,7 @@ fn sample_triangle(
     );
     Some(LightSample {
         value: radiance * (p.factor * light.scale),
+        geometry: p.factor,
         target: Target::Point(offset_point(p.position, p.normal)),
     })
 }
@@ -270,12 +273,15 @@ fn sample_dome(light: &Light, at: &SurfaceHit, u: [f32; 2], points: PointSamplin
     if even {
         return Some(LightSample {
             value: Vec3::from(light.radiance) * p.factor,
+            geometry: p.factor,
             target: Target::Point(offset_point(p.position, p.normal)),
         });
     }
     let cos_elevation = (1.0 - p.direction.z * p.direction.z).max(1e-8).sqrt();
+    let geometry = p.factor / (PI * cos_elevation);
     Some(LightSample {
-        value: Vec3::from(light.radiance) * (p.factor / (PI * cos_elevation)),
+        value: Vec3::from(light.radiance) * geometry,
+        geometry,
         target: Target::Point(offset_point(p.position, p.normal)),
     })
 }
@@ -312,11 +318,11 @@ fn sample_sphere(light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Opt
     if light.flags & LIGHT_NO_COSINE != 0 {
         cosine = 1.0;
     }
-    let mut value = if light.flags & LIGHT_LINEAR != 0 {
-        Vec3::from(light.radiance) * ((light.p2[2] - d * light.p2[1]).max(0.0) * cosine)
+    let mut geometry = if light.flags & LIGHT_LINEAR != 0 {
+        (light.p2[2] - d * light.p2[1]).max(0.0) * cosine
     } else {
         // Solid angle 2π·cone; irradiance/π is radiance · cos · solid angle / π.
-        Vec3::from(light.radiance) * (2.0 * cone * cosine)
+        2.0 * cone * cosine
     };
     if light.flags & LIGHT_SPOT != 0 {
         let spot = Vec3::from(light.p1);
@@ -327,10 +333,11 @@ fn sample_sphere(light: &Light, at: &SurfaceHit, u: [f32; 2], soft: bool) -> Opt
         } else {
             0.0
         };
-        value *= edge.clamp(0.0, 1.0);
+        geometry *= edge.clamp(0.0, 1.0);
     }
     Some(LightSample {
-        value,
+        value: Vec3::from(light.radiance) * geometry,
+        geometry,
         target: Target::Point(at.position + direction * reach),
     })
 }
@@ -342,6 +349,7 @@ fn sky_sample(at: &SurfaceHit, azimuth: f32, elevation: f32, value: Vec3) -> Opt
     let cosine = receiver_cosine(at, direction);
     (cosine > 0.0).then(|| LightSample {
         value: value * cosine,
+        geometry: cosine,
         target: Target::Sky(direction),
     })
 }

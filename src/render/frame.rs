@@ -6,7 +6,7 @@ use super::deform::Deform;
 use super::direct::Direct;
 use super::exposure::Exposure;
 use super::focus::Focus;
-use super::frame_constants::{FrameConstants, Push};
+use super::frame_constants::{FrameConstants, NO_SUCH_LIGHT, Push};
 use super::gbuffer::GBuffer;
 use super::gradient::Gradient;
 use super::gradient_atrous::GradientAtrous;
@@ -27,7 +27,7 @@ use crate::scene::camera::Camera;
 use crate::scene::entity_geometry::EntityState;
 use crate::scene::guests::guests;
 use crate::scene::polygons::Polygon;
-use crate::scene::records::Light;
+use crate::scene::records::{Light, NONE};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -310,6 +310,10 @@ fn frame_constants(
         guest_count: guests.len() as u32,
         draw_sun: u32::from(s.draw_sun),
         white: u32::from(s.white),
+        solo_light: s
+            .solo_light
+            .map_or(NONE, |n| if n < scene.light_count { n } else { NO_SUCH_LIGHT }),
+        light_term: s.light_term as u32,
         counters: view.counters[slot].address(),
         exposure: view.exposure.address(),
         focus: view.focus[slot].address(),

@@ -1,6 +1,7 @@
 //! What stays the same for one frame, as the shaders read it. `shaders/include/scene.glsl` is the GLSL side; a test compares
 //! member offsets.
 
+use crate::scene::records::NONE;
 use bytemuck::{Pod, Zeroable};
 
 /// `struct FrameConstants`: addresses first, then the view, then settings.
@@ -163,7 +164,14 @@ pub struct FrameConstants {
     pub secondary_levels: u32,
     /// Surfaces are white, and what is see-through is not there to the eye.
     pub white: u32,
+    /// The one light that lights; [`NONE`] for all, [`NO_SUCH_LIGHT`] where the map has none of its number.
+    pub solo_light: u32,
+    /// [`crate::render::settings::LightTerm`].
+    pub light_term: u32,
 }
+
+/// [`FrameConstants::solo_light`] of a number that no light has.
+pub const NO_SUCH_LIGHT: u32 = NONE - 1;
 
 /// Push constants of every pass.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -126,6 +126,8 @@ pub struct SceneGpu {
     pub cell_mask: u32,
     /// Lights in the tree; suns follow.
     pub finite_lights: u32,
+    /// All lights.
+    pub light_count: u32,
     pub bsp_nodes: Buffer,
     pub texture_infos: Buffer,
     /// sRGB byte to linear light.
@@ -383,6 +385,7 @@ impl SceneGpu {
             },
             cell_mask: (scene.cells.slots.len() as u32).checked_sub(1).unwrap_or(NONE),
             finite_lights: scene.lights.tree.finite,
+            light_count: scene.lights.lights.len() as u32,
             bsp_nodes: take(bsp_nodes)?,
             texture_infos: take(texture_infos)?,
             srgb_table: take(srgb_table)?,

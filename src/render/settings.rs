@@ -63,6 +63,19 @@ pub enum Secondary {
     Both = 2,
 }
 
+/// What a light sample is shown by. Its contribution to irradiance/π is the product of the three terms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightTerm {
+    /// Its contribution.
+    All = 0,
+    /// The share of its light that arrives.
+    Visibility = 1,
+    /// Cosines and distance, over π and the pdf of its position.
+    Geometry = 2,
+    /// The radiance that leaves the light.
+    Emission = 3,
+}
+
 /// What the estimators and the output stage are asked to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -70,6 +83,9 @@ pub struct Settings {
     pub illumination: bool,
     /// Show light alone: surfaces are white, and what is see-through is not there to the eye.
     pub white: bool,
+    /// The one light that lights, by its number; `None`: all of them.
+    pub solo_light: Option<u32>,
+    pub light_term: LightTerm,
     /// 0 all lights, 1 the PVS row, 2 the tight row.
     pub cull_lights: u32,
     /// Lights sampled at random per hit; 0: every light of the row.
@@ -198,6 +214,8 @@ impl Settings {
             && self.light_sampling == LightSampling::Reservoir
             && self.random_lights == 1
             && self.illumination
+            && self.solo_light.is_none()
+            && self.light_term == LightTerm::All
     }
 }
 
@@ -233,6 +251,8 @@ impl Default for Settings {
         Self {
             illumination: true,
             white: false,
+            solo_light: None,
+            light_term: LightTerm::All,
             cull_lights: 1,
             random_lights: 1,
             light_sampling: LightSampling::Reservoir,

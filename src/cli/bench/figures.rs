@@ -6,7 +6,7 @@ use super::super::render::camera;
 use super::frames::{FramesArgs, usual_maps};
 use super::results::write;
 use super::{FOV, vulkan_engine};
-use crate::bench::figures::{Figure, Panel, SIZES, Show, figure, samples, show};
+use crate::bench::figures::{Figure, GLASS, Panel, SIZES, SOLO, Show, figure, samples, show};
 use crate::bench::frames::{Way, go};
 use crate::bench::page::Page;
 use crate::bench::plot::{Axis, Series, Style, bars, chart};
@@ -18,9 +18,12 @@ use crate::console::Cvars;
 use crate::console::settings::settings;
 use crate::engine::Prepared;
 use crate::output::{atomic, png_file, stdout};
+use crate::reference::direct::strongest_light;
 use crate::reference::trace::Tracer;
+use crate::reference::views::feature_views;
 use crate::render::realtime::Realtime;
 use crate::render::scene_gpu::SceneGpu;
+use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 use glam::Vec3;
@@ -34,17 +37,16 @@ struct Making<'a> {
     gpu: Arc<SceneGpu>,
     cvars: &'a Cvars,
     view: Camera,
+    /// The light that figure 7.12 shows.
+    solo: Option<u32>,
 }
 
 /// Makes a figure of each map.
 pub(super) fn run(common: &Common, cvars: &Cvars, args: &FramesArgs, name: &str, maps: &[String]) -> CliResult {
     let Some((title, made_of)) = figure(name) else {
-        return Err(CliError::Usage(match name {
-            "fig7.12" => {
-                "fig7.12 wants lights alone and the terms of their light alone, which no setting gives yet".to_owned()
-            }
-            _ => format!("there is no experiment \"{name}\"; those of the thesis are fig7.1 to fig7.14"),
-        }));
+        return Err(CliError::Usage(format!(
+            "there is no experiment \"{name}\"; those of the thesis are fig7.1 to fig7.14 and {GLASS}"
+        )));
     };
     let maps = usual_maps(common, maps)?;
     let engine = vulkan_engine(common, cvars, name)?;
@@ -57,22 +59,30 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &FramesArgs, name: &str,
         let Prepared::Gpu(gpu) = engine.prepare(&scene).map_err(CliError::failed)? else {
             return Err(CliError::Failed("the experiments run on Vulkan devices".to_owned()));
         };
-        let view = camera(&scene, args.camera.as_deref(), args.spawn, FOV)?;
+        let view = match name == GLASS && args.camera.is_none() && args.spawn.is_none() {
+            true => glass(&scene)?,
+            false => camera(&scene, args.camera.as_deref(), args.spawn, FOV)?,
+        };
+        let solo = (name == SOLO).then(|| args.light.unwrap_or_else(|| strongest_light(&scene, &view)));
         let making = Making {
             args,
             scene: &scene,
             gpu,
             cvars,
             view,
+            solo,
         };
         page.heading(map);
+        if let Some(light) = solo {
+            page.paragraph(&format!("Light {light} of {}.", scene.lights.lights.len()));
+        }
         let found = match &made_of {
             Figure::Pictures(panels) => making.pictures(&mut page, panels)?,
             Figure::Sizes(panels) => making.sizes(&mut page, panels, name == "fig7.8")?,
             Figure::Samples => making.samples(&mut page)?,
             Figure::Walk(panel) => making.walk(&mut page, panel)?,
         };
-        data.push(json!({ "map": map, "lights": scene.lights.lights.len(), "figure": found }));
+        data.push(json!({ "map": map, "lights": scene.lights.lights.len(), "light": solo, "figure": found }));
         bar.inc(1);
         let all = json!({ "kind": name, "title": title, "maps": data });
         write(
@@ -85,9 +95,31 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &FramesArgs, name: &str,
     stdout::line(args.out.join("report.html").display()).map_err(CliError::failed)
 }
 
+/// A view of a pane or of water, right at it.
+fn glass(scene: &Scene) -> Result<Camera, CliError> {
+    let found = feature_views(scene).into_iter().find(|v| v.feature == "dielectric");
+    let found = found.ok_or_else(|| {
+        CliError::Failed(format!(
+            "no glass or water of {} can be seen well; name a view of some with --camera",
+            scene.name
+        ))
+    })?;
+    // Level views have it so much below their middle.
+    let pitch = (-found.at[1] * (0.5 * FOV).to_radians().tan()).atan().to_degrees();
+    Ok(Camera {
+        pitch,
+        ..Camera::new(found.eye.into(), found.yaw, FOV)
+    })
+}
+
 impl Making<'_> {
     fn stage(&self, size: (u32, u32)) -> Result<Stage, CliError> {
-        Stage::new(self.gpu.clone(), &settings(self.cvars), size, 1).map_err(CliError::failed)
+        let base = settings(self.cvars);
+        let base = Settings {
+            solo_light: self.solo.or(base.solo_light),
+            ..base
+        };
+        Stage::new(self.gpu.clone(), &base, size, 1).map_err(CliError::failed)
     }
 
     /// The view, nearer to what is under the crosshair.
@@ -127,17 +159,17 @@ impl Making<'_> {
         let mut shown = Vec::new();
         for panel in panels {
             let camera = self.closer(panel.closer);
-            shown.push(show(&mut stage, &camera, panel).map_err(CliError::failed)?);
+            shown.push(show(&mut stage, &camera, panel, self.args.truth).map_err(CliError::failed)?);
         }
         let truth: Option<Pixels> = panels
             .last()
             .zip(shown.last())
-            .filter(|(panel, _)| matches!(panel.show, Show::Mean(_)))
+            .filter(|(panel, _)| panel.show == Show::Truth)
             .map(|(_, s)| s.pixels.clone());
         let mut rows = Vec::new();
         let mut out = Vec::new();
         for (panel, one) in panels.iter().zip(&shown) {
-            let comparable = truth.as_ref().filter(|_| panel.closer == 0.0);
+            let comparable = truth.as_ref().filter(|_| !panel.apart);
             let metrics = comparable.and_then(|t| stage.compare_images(&one.pixels, t).ok());
             let figure = |f: Option<f64>| f.map_or("–".to_owned(), |v| format!("{v:.4}"));
             let of = |f: fn(&crate::metrics::Metrics) -> Option<f64>| metrics.as_ref().and_then(f);
@@ -150,7 +182,7 @@ impl Making<'_> {
                 error.map_or("–".to_owned(), |e| format!("{e:.2e}")),
             ]);
             out.push(json!({ "panel": panel.label, "ms": one.ms, "ssim": ssim, "flip": flip, "rel_mse": error }));
-            let reference = truth.as_ref().unwrap_or(&one.pixels);
+            let reference = truth.as_ref().filter(|_| !panel.apart).unwrap_or(&one.pixels);
             let display = stage.displayed(&one.pixels, reference);
             self.picture(page, panel.label, panel.label, &display)?;
         }
@@ -164,7 +196,7 @@ impl Making<'_> {
         for size in SIZES {
             let mut stage = self.stage(size)?;
             for panel in panels {
-                let shown = show(&mut stage, &self.view, panel).map_err(CliError::failed)?;
+                let shown = show(&mut stage, &self.view, panel, self.args.truth).map_err(CliError::failed)?;
                 let ms = if of_denoiser { shown.denoiser_ms } else { shown.ms };
                 lengths.push((format!("{}x{}, {}", size.0, size.1, panel.label), vec![ms]));
                 out.push(json!({ "size": [size.0, size.1], "panel": panel.label, "ms": ms }));
@@ -177,7 +209,7 @@ impl Making<'_> {
 
     fn samples(&self, page: &mut Page) -> Result<Value, CliError> {
         let mut stage = self.stage(self.args.size)?;
-        let rows = samples(&mut stage, &self.view).map_err(CliError::failed)?;
+        let rows = samples(&mut stage, &self.view, self.args.truth).map_err(CliError::failed)?;
         for (name, of) in [("ms", 0), ("SSIM", 1)] {
             let series = |label: &str, traditional: bool| Series {
                 name: label.to_owned(),

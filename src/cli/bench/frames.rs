@@ -5,6 +5,7 @@ use super::super::common::{Common, progress};
 use super::super::render::parse_size;
 use super::results::{earlier, write};
 use super::{DEFAULT_MAPS, vulkan_engine};
+use crate::bench::figures::TRUTH;
 use crate::bench::frames::{MapFrames, Options, Way, run as measure};
 use crate::bench::frames_report::{FramesReport, KIND, frames_csv};
 use crate::bench::run_info::RunInfo;
@@ -21,7 +22,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(super) struct FramesArgs {
-    /// Map names; without any the shipped one and those of the published figures that are found. fig7.1 to fig7.14 in front of them:
+    /// Map names; without any the shipped one and those of the published figures that are found. fig7.1 to fig7.14 or sec7.5 in front of them:
     /// that experiment of the thesis
     maps: Vec<String>,
     /// Recording to go along, in place of a tour of the spawn points
@@ -56,6 +57,12 @@ pub(super) struct FramesArgs {
     /// For fig7.N: spawn point to look from
     #[arg(long, value_name = "N")]
     pub(super) spawn: Option<usize>,
+    /// For fig7.12: the light that lights alone, by its number; without it the one that gives the view most
+    #[arg(long, value_name = "N")]
+    pub(super) light: Option<u32>,
+    /// For fig7.N: samples whose mean is the truth
+    #[arg(long, value_name = "N", default_value_t = TRUTH, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) truth: u32,
     /// For fig7.1: the original's picture of the view, as tests/original_view.sh makes it
     #[arg(long, value_name = "FILE.png")]
     pub(super) original: Option<PathBuf>,
@@ -65,7 +72,7 @@ impl FramesArgs {
     /// The experiment of the thesis that is asked for, and its maps.
     pub(super) fn figure(&self) -> Option<(&str, &[String])> {
         let (first, rest) = self.maps.split_first()?;
-        first.starts_with("fig").then_some((first.as_str(), rest))
+        (first.starts_with("fig") || first.starts_with("sec7")).then_some((first.as_str(), rest))
     }
 
     /// The maps asked for, or the usual ones that are there.
@@ -139,6 +146,13 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &FramesArgs) -> CliResul
         Some(_) => std::fs::read_to_string(&frames_file).unwrap_or_default(),
         None => String::new(),
     };
+    // Maps that an earlier call measured and this one does not are in none of its files.
+    frames_text = frames_text
+        .lines()
+        .enumerate()
+        .filter(|(i, l)| *i == 0 || maps.iter().any(|m| l.split(',').next() == Some(m)))
+        .map(|(_, l)| format!("{l}\n"))
+        .collect();
     let total = u64::from(args.runs) * u64::from(args.frames + args.warmup);
     let bar = progress(total * maps.len() as u64, "bench");
     for map in &maps {
