@@ -105,6 +105,8 @@ pub struct ViewErrors {
     /// Largest standard error of a figure over it, and of how many figures it is above the wanted one.
     pub worst: f64,
     pub unsure: usize,
+    /// `rel_mse` of the mean of both truths, against which SSIM and FLIP are taken.
+    pub noise: f64,
     pub rows: Vec<Row>,
     /// Choices that took too long, with the milliseconds of a frame.
     pub left_out: Vec<(String, f64)>,
@@ -179,14 +181,18 @@ impl ErrorBench {
         &self.stage.base
     }
 
-    /// Images and time of a choice; `Err` with the time where a frame takes too long.
+    /// A stage for images of another size than the truths'.
+    fn smaller(&self, size: (u32, u32)) -> Result<Option<Stage>, RenderError> {
+        let other = size != self.options.size;
+        other
+            .then(|| Stage::new(self.scene.clone(), &self.stage.base, size, FIRST_SAMPLES))
+            .transpose()
+    }
+
+    /// Images of a choice; `Err` with the time where a frame takes too long.
     fn show(&mut self, camera: &Camera, config: &Config) -> Result<Result<Shown, f64>, RenderError> {
         let size = config.traced(self.options.size);
-        let mut small = if size == self.options.size {
-            None
-        } else {
-            Some(Stage::new(self.scene.clone(), &self.stage.base, size, FIRST_SAMPLES)?)
-        };
+        let mut small = self.smaller(size)?;
         let stage = small.as_mut().unwrap_or(&mut self.stage);
         let settings = config.settings(&stage.base);
         // Ends histories, and shows how long a frame takes.
@@ -200,7 +206,6 @@ impl ErrorBench {
             return Ok(Err(once * f64::from(config.samples)));
         }
         let mut images = Vec::new();
-        let mut times = Vec::new();
         for run in 0..self.options.images {
             let settings = Settings {
                 seed: stage.base.seed.wrapping_add(run),
@@ -217,18 +222,31 @@ impl ErrorBench {
             };
             images.push(enlarged(&image, size, self.options.size));
         }
-        let accumulated = u32::from(!config.has_history());
-        let mut ended = Vec::new();
-        for index in 0..TIMED {
-            ended.extend(stage.frame(camera, &settings, index, accumulated)?);
-        }
-        ended.extend(stage.realtime.finish()?);
-        times.extend(ended.iter().skip(TIMED as usize / 4).map(FrameStats::ms));
         Ok(Ok(Shown {
             config: *config,
-            ms: median(&times).unwrap_or(once) * f64::from(config.samples),
+            ms: once * f64::from(config.samples),
             images,
         }))
+    }
+
+    /// The times of choices, one right after the other.
+    fn time(&mut self, camera: &Camera, shown: &mut [Shown]) -> Result<(), RenderError> {
+        let base = self.stage.base;
+        self.stage.warm_up(camera, &base)?;
+        for one in shown {
+            let mut small = self.smaller(one.config.traced(self.options.size))?;
+            let stage = small.as_mut().unwrap_or(&mut self.stage);
+            let settings = one.config.settings(&base);
+            let accumulated = u32::from(!one.config.has_history());
+            let mut ended = Vec::new();
+            for index in 0..TIMED {
+                ended.extend(stage.frame(camera, &settings, index, accumulated)?);
+            }
+            ended.extend(stage.realtime.finish()?);
+            let times: Vec<f64> = ended.iter().skip(TIMED as usize / 4).map(FrameStats::ms).collect();
+            one.ms = median(&times).map_or(one.ms, |ms| ms * f64::from(one.config.samples));
+        }
+        Ok(())
     }
 
     fn falls(&mut self, camera: &Camera) -> Result<Vec<Means>, RenderError> {
@@ -316,6 +334,7 @@ impl ErrorBench {
                 Err(ms) => report.left_out.push((config.name(), ms)),
             }
         }
+        self.time(camera, &mut shown)?;
         let falls = self.falls(camera)?;
         keeper.news("truths", 0.5);
         let mut truth = match kept {
@@ -328,7 +347,15 @@ impl ErrorBench {
             let shares: Vec<f64> = report.rows.iter().map(|r| r.rel_mse_error / r.rel_mse.abs()).collect();
             report.worst = shares.iter().copied().fold(0.0, f64::max);
             report.unsure = shares.iter().filter(|s| **s > WANTED).count();
-            if report.unsure == 0 || truth.samples * 4 > self.options.most {
+            // SSIM and FLIP cannot be had without a floor of noise: it has to lie well below what is measured.
+            report.noise = 0.5 * truth.references.own_error();
+            let least = report
+                .rows
+                .iter()
+                .map(|r| r.rel_mse.abs())
+                .fold(f64::INFINITY, f64::min);
+            let quiet = report.noise <= WANTED * least;
+            if (report.unsure == 0 && quiet) || truth.samples * 4 > self.options.most {
                 break;
             }
             keeper.news(&format!("truths of {} samples", truth.samples * 4), 0.7);

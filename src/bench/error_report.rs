@@ -132,7 +132,8 @@ impl ErrorReport {
 fn view(page: &mut Page, v: &ViewErrors, folder: &Path) -> Result<(), PlotError> {
     page.heading(&format!("{}, spawn {}", v.map, v.spawn));
     page.paragraph(&format!(
-        "{} lights, {}x{}, truths of {} samples (at most {}), each of 4 lights. {}",
+        "{} lights, {}x{}, truths of {} samples (at most {}), each of 4 lights. {} SSIM and FLIP are taken against the mean of \
+         both, whose own rel_mse is {}.",
         v.lights,
         v.size[0],
         v.size[1],
@@ -148,7 +149,8 @@ fn view(page: &mut Page, v: &ViewErrors, folder: &Path) -> Result<(), PlotError>
                 WANTED * 100.0,
                 v.worst * 100.0
             )
-        }
+        },
+        short(v.noise)
     ));
     if !v.left_out.is_empty() {
         let names: Vec<String> = v

@@ -309,6 +309,8 @@ fn denoises(pass: &str) -> bool {
 /// [`RenderError`] of the device.
 pub fn show(stage: &mut Stage, camera: &Camera, panel: &Panel, truth: u32) -> Result<Shown, RenderError> {
     let settings = (panel.change)(stage.base);
+    stage.warm_up(camera, &settings)?;
+    // Ends histories.
     stage.frame(camera, &settings, 0, 1)?;
     let frames = if settings.denoiser || settings.taa { SETTLE } else { 1 };
     let mut ended = Vec::new();
@@ -346,6 +348,7 @@ pub fn samples(stage: &mut Stage, camera: &Camera, truth: u32) -> Result<Vec<Sam
         let single = one(stage.base);
         let mut measure = |settings: &Settings, samples: u32| -> Result<(f64, f64), RenderError> {
             let image = stage.accumulated(camera, settings, samples)?;
+            stage.warm_up(camera, settings)?;
             let mut ended = Vec::new();
             for index in 0..TIMED {
                 ended.extend(stage.frame(camera, settings, index, 1)?);

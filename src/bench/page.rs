@@ -9,6 +9,7 @@ background:#fff}h1{font-size:1.6em}h2{margin-top:2em;border-bottom:1px solid #cc
 margin:1em 0;font-size:13px;font-variant-numeric:tabular-nums}th,td{padding:3px 9px;border-bottom:1px solid #ddd;\
 text-align:right}th:first-child,td:first-child{text-align:left}th{background:#f4f4f4}figure{margin:1em 0;display:\
 inline-block;vertical-align:top;max-width:100%}figcaption{font-size:12px;color:#555;max-width:720px}img{max-width:100%}\
+.picture{width:calc(50% - 15px);margin:4px;cursor:zoom-in}.picture:focus{width:100%;cursor:zoom-out}.picture img{width:100%}\
 svg{max-width:100%;height:auto}.scroll{overflow-x:auto}code{background:#f4f4f4;padding:1px 4px}";
 
 const JPEG_QUALITY: u8 = 85;
@@ -81,6 +82,7 @@ impl Page {
     }
 
     /// A picture with a caption, of 8-bit sRGB: as JPEG, because noise makes large PNGs; the files beside the page are exact.
+    /// Two stand side by side; one that is clicked takes the page's whole width.
     pub fn picture(&mut self, width: u32, height: u32, pixels: &[[u8; 3]], caption: &str) {
         let mut bytes = Vec::new();
         let encoded = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).encode(
@@ -94,7 +96,8 @@ impl Page {
             Ok(()) => {
                 let data = BASE64_STANDARD.encode(&bytes);
                 self.add(format_args!(
-                    "<figure><img alt=\"{caption}\" src=\"data:image/jpeg;base64,{data}\">\
+                    "<figure class=\"picture\" tabindex=\"0\" title=\"click for full width\">\
+                     <img alt=\"{caption}\" src=\"data:image/jpeg;base64,{data}\">\
                      <figcaption>{caption}</figcaption></figure>\n"
                 ));
             }

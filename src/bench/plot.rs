@@ -1,5 +1,6 @@
 //! Plots as SVG: lines and points over linear or logarithmic axes, and stacked bars.
 
+use plotters::coord::combinators::WithKeyPoints;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use thiserror::Error;
@@ -16,8 +17,8 @@ impl PlotError {
     }
 }
 
-/// Colours that people who cannot tell red from green can tell apart (Okabe and Ito 2008).
-const COLOURS: [RGBColor; 8] = [
+/// Colours that people who cannot tell red from green can tell apart (Okabe and Ito 2008, and two of Tol 2021).
+const COLOURS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -26,11 +27,16 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(86, 180, 233),
     RGBColor(0, 0, 0),
     RGBColor(150, 150, 150),
+    RGBColor(136, 34, 85),
+    RGBColor(128, 128, 40),
 ];
 /// Size of a plot, pixels; rows of the legend are added.
 const SIZE: (u32, u32) = (720, 320);
 const LEGEND_ROW: u32 = 18;
-const LEGEND_COLUMN: u32 = 178;
+const LEGEND_LEFT: u32 = 50;
+/// Width of the legend's marks, and of a letter.
+const LEGEND_MARK: u32 = 34;
+const LETTER: f32 = 7.2;
 const FONT: (&str, i32) = ("sans-serif", 13);
 
 /// How a series is drawn.
@@ -66,8 +72,6 @@ fn span(values: impl Iterator<Item = f64>, axis: Axis<'_>) -> (f64, f64) {
     let (lo, hi) = usable.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
     match (lo <= hi, axis.logarithmic) {
         (false, _) => (0.1, 10.0),
-        // Whole decades where there are few: numbers stand at these alone.
-        (true, true) if hi < 100.0 * lo => (10f64.powf(lo.log10().floor()), 10f64.powf((hi * 1.001).log10().ceil())),
         (true, true) => (lo / 1.3, hi * 1.3),
         // Times and counts begin at 0, so that lengths can be compared.
         (true, false) => {
@@ -93,18 +97,42 @@ pub fn short(v: f64) -> String {
     }
 }
 
-fn legend_rows(count: usize) -> u32 {
-    let columns = (SIZE.0 / LEGEND_COLUMN).max(1);
-    (count as u32).div_ceil(columns)
+/// Where numbers stand on a logarithmic axis: the fewer decades, the more of them.
+fn ticks(lo: f64, hi: f64) -> Vec<f64> {
+    let decades = (hi / lo).log10();
+    let (steps, every): (&[f64], i32) = match decades {
+        d if d <= 1.0 => (&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], 1),
+        d if d <= 2.5 => (&[1.0, 2.0, 5.0], 1),
+        d => (&[1.0], (d / 8.0).ceil() as i32),
+    };
+    let decades = lo.log10().floor() as i32..=hi.log10().ceil() as i32;
+    decades
+        .filter(|d| d.rem_euclid(every) == 0)
+        .flat_map(|d| steps.iter().map(move |s| s * 10f64.powi(d)))
+        .filter(|v| (lo..=hi).contains(v))
+        .collect()
+}
+
+/// Columns of a legend and their width, pixels.
+fn legend_columns(names: &[&str]) -> (u32, u32) {
+    let letters = names.iter().map(|n| n.chars().count()).max().unwrap_or(0);
+    let width = LEGEND_MARK + (letters as f32 * LETTER) as u32;
+    (((SIZE.0 - LEGEND_LEFT) / width).max(1), width)
+}
+
+/// Height of a legend.
+fn legend_height(names: &[&str]) -> u32 {
+    (names.len() as u32).div_ceil(legend_columns(names).0) * LEGEND_ROW + 6
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 fn legend(area: &Area<'_>, names: &[&str]) -> Result<(), PlotError> {
-    let columns = (SIZE.0 / LEGEND_COLUMN).max(1) as usize;
-    for (i, name) in names.iter().enumerate() {
-        let x = 50 + (i % columns) as i32 * LEGEND_COLUMN as i32;
-        let y = 2 + (i / columns) as i32 * LEGEND_ROW as i32;
+    let (columns, width) = legend_columns(names);
+    for (i, name) in (0..).zip(names) {
+        let x = (LEGEND_LEFT + i % columns * width) as i32;
+        let y = 2 + (i / columns * LEGEND_ROW) as i32;
+        let i = i as usize;
         area.draw(&Rectangle::new([(x, y + 2), (x + 14, y + 12)], colour(i).filled()))
             .map_err(PlotError::of)?;
         area.draw(&Text::new((*name).to_owned(), (x + 19, y), FONT))
@@ -160,27 +188,31 @@ where
     Ok(())
 }
 
+fn logarithmic((lo, hi): (f64, f64)) -> WithKeyPoints<LogCoord<f64>> {
+    (lo..hi).log_scale().with_key_points(ticks(lo, hi))
+}
+
 /// Draws series over two axes.
 ///
 /// # Errors
 /// [`PlotError`] where the drawing library fails.
 pub fn chart(axes: [Axis<'_>; 2], series: &[Series]) -> Result<String, PlotError> {
-    let rows = legend_rows(series.len()) * LEGEND_ROW + 6;
+    let names: Vec<&str> = series.iter().map(|s| s.name.as_str()).collect();
+    let rows = legend_height(&names);
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, (SIZE.0, SIZE.1 + rows)).into_drawing_area();
         root.fill(&WHITE).map_err(PlotError::of)?;
         let (top, area) = root.split_vertically(rows);
-        let names: Vec<&str> = series.iter().map(|s| s.name.as_str()).collect();
         legend(&top, &names)?;
         let all = || series.iter().flat_map(|s| s.points.iter());
         let x = span(all().map(|p| p.0), axes[0]);
         let y = span(all().map(|p| p.1), axes[1]);
         match (axes[0].logarithmic, axes[1].logarithmic) {
             (false, false) => draw(&area, x.0..x.1, y.0..y.1, axes, series)?,
-            (true, false) => draw(&area, (x.0..x.1).log_scale(), y.0..y.1, axes, series)?,
-            (false, true) => draw(&area, x.0..x.1, (y.0..y.1).log_scale(), axes, series)?,
-            (true, true) => draw(&area, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), axes, series)?,
+            (true, false) => draw(&area, logarithmic(x), y.0..y.1, axes, series)?,
+            (false, true) => draw(&area, x.0..x.1, logarithmic(y), axes, series)?,
+            (true, true) => draw(&area, logarithmic(x), logarithmic(y), axes, series)?,
         }
         root.present().map_err(PlotError::of)?;
     }
@@ -199,7 +231,7 @@ const NAMES: i32 = 190;
 /// # Errors
 /// [`PlotError`] where the drawing library fails.
 pub fn bars(unit: &str, parts: &[&str], bars: &[Bar]) -> Result<String, PlotError> {
-    let top = legend_rows(parts.len()) * LEGEND_ROW + 6;
+    let top = legend_height(parts);
     let height = top + BAR * bars.len() as u32 + 12;
     let longest = bars
         .iter()
@@ -252,6 +284,9 @@ mod tests {
             assert!(text.starts_with("<svg") && !text.contains("NaN"), "{text}");
         }
         assert!(chart([axis(true), axis(true)], &[]).is_ok());
+        assert_eq!(ticks(0.9, 6.0), [1.0, 1.5, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(ticks(3.0, 110.0).len(), 5);
+        assert_eq!(ticks(1e-3, 1e3).len(), 7);
         assert!(bars("ms", &["a"], &[("b".into(), vec![0.0])]).is_ok());
         assert_eq!(
             [short(0.0), short(12.0), short(0.25), short(1e-5)],

@@ -26,6 +26,7 @@ use crate::render::scene_gpu::SceneGpu;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
+use crate::scene::records::SEEN_BY_EYE;
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -122,13 +123,13 @@ impl Making<'_> {
         Stage::new(self.gpu.clone(), &base, size, 1).map_err(CliError::failed)
     }
 
-    /// The view, nearer to what is under the crosshair.
+    /// The view, nearer to what is under the crosshair, be it glass.
     fn closer(&self, share: f32) -> Camera {
         if share <= 0.0 {
             return self.view;
         }
         let (eye, forward) = (Vec3::from(self.view.eye), self.view.axes().forward);
-        let hit = Tracer::new(self.scene).closest(self.scene, eye, forward, f64::from(f32::MAX));
+        let hit = Tracer::new(self.scene).look(self.scene, eye, forward, None, SEEN_BY_EYE);
         let way = hit.map_or(0.0, |h| h.t as f32) * share;
         Camera {
             eye: (eye + forward * way).into(),
