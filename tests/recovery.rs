@@ -254,11 +254,15 @@ fn quick() -> Options {
 fn scenes_are_lit_from_lightmaps_the_cache_and_the_paks() {
     let (mut scene, _) = planted(2, &scattered(2, 2), &Encoding::LINEAR);
     let folder = tempfile::tempdir().expect("a folder");
+    let kept = lighting::Kept {
+        lights: folder.path().join("lights"),
+        cells: folder.path().join("cells"),
+    };
     let known = scene.lights.lights.len();
     let none = Files(Vec::new());
     let recovered = |scene: &Scene| scene.lights.count(LightSource::Recovered);
     let light = |scene: &mut Scene, files: &Files, which| {
-        lighting::light(scene, files, which, folder.path(), &quick(), &common::quiet).expect("lights")
+        lighting::light(scene, files, which, &kept, &quick(), &common::quiet).expect("lights")
     };
     let lit = light(&mut scene, &none, Lights::Known);
     assert!(lit.loaded.is_none() && scene.lights.lights.len() == known);
@@ -278,6 +282,7 @@ fn scenes_are_lit_from_lightmaps_the_cache_and_the_paks() {
         .expect("lights in the cache");
     assert!(matches!(second.origin, Origin::Cache(_)), "{:?}", second.origin);
     assert_eq!(again.lights.lights, scene.lights.lights);
+    assert_eq!(again.cells, scene.cells);
     // A file in the paks counts before both, and a wrong one is told with its line.
     let text = "light 100 100 100 photons 50\nlight 120 100 100 photons 20\n";
     let paks = |text: &str| Files(vec![(format!("maps/{}.lights", again.name), text.into())]);
@@ -287,7 +292,7 @@ fn scenes_are_lit_from_lightmaps_the_cache_and_the_paks() {
         .expect("the paks' lights");
     assert_eq!(edited.origin, Origin::Paks);
     assert_eq!((recovered(&again), again.lights.lights.len()), (2, 2));
-    let wrong = lighting::light(&mut again, &bad, Lights::All, folder.path(), &quick(), &common::quiet);
+    let wrong = lighting::light(&mut again, &bad, Lights::All, &kept, &quick(), &common::quiet);
     let told = wrong.expect_err("a light needs three numbers").to_string();
     assert!(told.contains(".lights") && told.contains("line 1"), "{told}");
 }

@@ -45,6 +45,11 @@ impl Folders {
         self.cache.join("pipelines.bin")
     }
 
+    /// Light cells of maps.
+    pub fn light_cells(&self) -> PathBuf {
+        self.cache.join("light_cells")
+    }
+
     /// File of a recording.
     ///
     /// # Errors

@@ -141,19 +141,14 @@ impl Common {
         let mut scene = Scene::load_with(files, map, &options).map_err(CliError::failed)?;
         tell_warnings(&scene, news.warn);
         // Beside the configuration.
-        let folder = Folders::new(self.home.as_deref()).config.join("lights");
-        let lit = lighting::light(
-            &mut scene,
-            files,
-            lights(cvars),
-            &folder,
-            &Options::default(),
-            news.share,
-        );
+        let folders = Folders::new(self.home.as_deref());
+        let kept = lighting::Kept {
+            lights: folders.config.join("lights"),
+            cells: folders.light_cells(),
+        };
+        let lit = lighting::light(&mut scene, files, lights(cvars), &kept, &Options::default(), news.share);
         let lit = lit.map_err(CliError::failed)?;
-        if let Some(warning) = lit.loaded.as_ref().and_then(|l| l.warning.as_ref()) {
-            (news.warn)(warning);
-        }
+        lit.warnings.iter().for_each(|warning| (news.warn)(warning));
         Ok((scene, lit))
     }
 }

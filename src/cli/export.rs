@@ -2,7 +2,7 @@
 
 use super::args::{CliError, CliResult};
 use super::common::Common;
-use super::render::camera;
+use super::view::ViewArgs;
 use crate::console::Cvars;
 use crate::console::settings::settings;
 use crate::export::glb;
@@ -19,17 +19,8 @@ pub struct Args {
     /// File to write
     #[arg(value_name = "OUT.glb")]
     out: PathBuf,
-    /// Eye and angles of the file's camera: X,Y,Z,PITCH,YAW[,ROLL] (units, degrees)
-    #[arg(
-        long,
-        value_name = "X,Y,Z,PITCH,YAW[,ROLL]",
-        allow_hyphen_values = true,
-        conflicts_with = "spawn"
-    )]
-    camera: Option<String>,
-    /// Spawn point that the file's camera looks from, counted from 0
-    #[arg(long, value_name = "N")]
-    spawn: Option<usize>,
+    #[command(flatten)]
+    view: ViewArgs,
     /// Scene clock, seconds
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, default_value_t = 0.0)]
     time: f64,
@@ -45,12 +36,7 @@ pub fn run(common: &Common, cvars: &Cvars, args: &Args) -> CliResult {
     }
     atomic::create_parent(&args.out).map_err(CliError::failed)?;
     let (scene, _) = common.lit_scene(&args.map, cvars)?;
-    let camera = camera(
-        &scene,
-        args.camera.as_deref(),
-        args.spawn,
-        cvars.number("cg_fov") as f32,
-    )?;
+    let camera = args.view.camera(&scene, cvars.number("cg_fov") as f32)?;
     let settings = Settings {
         clock: Clock::from_seconds(args.time),
         ..settings(cvars)

@@ -13,5 +13,6 @@ mod merge;
 mod path;
 mod play;
 mod render;
+mod view;
 
 pub use args::{CliError, run};

@@ -2,6 +2,7 @@
 
 use super::args::{CliError, CliResult};
 use super::common::{Common, progress};
+use super::view::{ViewArgs, parse_camera, parse_size};
 use crate::app::headless::{Loop, run_frames, run_stats};
 use crate::console::Cvars;
 use crate::console::settings::{FRAME_RATE, settings};
@@ -11,10 +12,8 @@ use crate::output::{OutputError, atomic, exr_file, picture};
 use crate::reference::direct::RayCounts;
 use crate::render::film::{Aovs, Film};
 use crate::render::settings::Settings;
-use crate::scene::Scene;
-use crate::scene::camera::{Camera, Shot};
+use crate::scene::camera::Shot;
 use crate::scene::clock::Clock;
-use crate::scene::spawns::{overview, view};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,20 +22,11 @@ use std::time::Instant;
 pub struct Args {
     /// Map name
     pub map: String,
-    /// Eye and angles: X,Y,Z,PITCH,YAW[,ROLL] (units, degrees)
-    #[arg(
-        long,
-        value_name = "X,Y,Z,PITCH,YAW[,ROLL]",
-        allow_hyphen_values = true,
-        conflicts_with = "spawn"
-    )]
-    camera: Option<String>,
+    #[command(flatten)]
+    view: ViewArgs,
     /// Where the camera is when the shutter closes, for rt_motionblur
     #[arg(long, value_name = "X,Y,Z,PITCH,YAW[,ROLL]", allow_hyphen_values = true)]
     camera_to: Option<String>,
-    /// Spawn point to look from, counted from 0
-    #[arg(long, value_name = "N")]
-    spawn: Option<usize>,
     /// Horizontal field of view, degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     fov: Option<String>,
@@ -73,65 +63,11 @@ pub struct Args {
     path: Option<PathBuf>,
 }
 
-/// Largest image edge, pixels: what random-number addresses and GPUs hold.
-const MAX_EDGE: u32 = 16_384;
-
 /// Parses a frame rate.
 fn parse_rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
         _ => Err("expected frames per second above 0, such as 60".to_owned()),
-    }
-}
-
-/// Parses `WxH`.
-pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let parsed = text
-        .split_once(['x', 'X'])
-        .and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
-    match parsed {
-        Some((w, h)) if (1..=MAX_EDGE).contains(&w) && (1..=MAX_EDGE).contains(&h) => Ok((w, h)),
-        Some(_) => Err(format!("edges must be 1 to {MAX_EDGE} pixels")),
-        None => Err("expected WIDTHxHEIGHT, such as 1280x720".to_owned()),
-    }
-}
-
-/// The view that was asked for.
-pub fn camera(scene: &Scene, camera: Option<&str>, spawn: Option<usize>, fov: f32) -> Result<Camera, CliError> {
-    if let Some(text) = camera {
-        let numbers: Vec<f32> = text
-            .split(',')
-            .map(|n| n.trim().parse::<f32>().ok().filter(|x| x.is_finite()))
-            .collect::<Option<_>>()
-            .unwrap_or_default();
-        let ([x, y, z, pitch, yaw], roll) = match numbers[..] {
-            [x, y, z, pitch, yaw] => ([x, y, z, pitch, yaw], 0.0),
-            [x, y, z, pitch, yaw, roll] => ([x, y, z, pitch, yaw], roll),
-            _ => {
-                return Err(CliError::Usage(format!(
-                    "--camera takes five or six numbers X,Y,Z,PITCH,YAW[,ROLL], not \"{text}\""
-                )));
-            }
-        };
-        return Ok(Camera {
-            eye: [x, y, z],
-            pitch,
-            yaw,
-            roll,
-            fov,
-        });
-    }
-    match (scene.spawns.get(spawn.unwrap_or(0)), scene.spawns.len()) {
-        (Some(s), _) => Ok(view(s, fov)),
-        (None, 0) if spawn.is_none() => {
-            eprintln!("warning: {} has no spawn point; looking from its middle", scene.name);
-            Ok(overview(&scene.bsp, fov))
-        }
-        (None, n) => Err(CliError::Failed(format!(
-            "{} has {n} spawn points, so there is no number {}",
-            scene.name,
-            spawn.unwrap_or(0)
-        ))),
     }
 }
 
@@ -204,16 +140,11 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         shutter: settings(&cvars).shutter * args.fps.map_or(1.0, |fps| FRAME_RATE / fps as f32),
         ..settings(&cvars)
     };
-    let camera = camera(
-        &scene,
-        args.camera.as_deref(),
-        args.spawn,
-        cvars.number("cg_fov") as f32,
-    )?;
+    let camera = args.view.camera(&scene, cvars.number("cg_fov") as f32)?;
     let shot = Shot {
         open: camera,
         close: match &args.camera_to {
-            Some(to) => self::camera(&scene, Some(to), None, camera.fov)?,
+            Some(to) => parse_camera(to, camera.fov)?,
             None => camera,
         },
     };

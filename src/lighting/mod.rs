@@ -1,16 +1,16 @@
 //! From a loaded scene to a lit one: which lights it has, what is left over, and what lights are chosen by.
 
 pub mod ambient;
+pub mod kept_cells;
 
 use crate::assets::vfs::FileSource;
 use crate::recovery::cache::{LoadError, Loaded, load_or_recover};
 use crate::recovery::encoding::lights_kept_unasked;
 use crate::recovery::{LightsFile, Options, RecoveryError, scene_lights};
-use crate::reference::light_cells;
 use crate::reference::trace::Tracer;
 use crate::scene::Scene;
 use crate::scene::lights::LightSource;
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Which lights a scene gets (`rt_lights`).
@@ -25,6 +25,26 @@ pub enum Lights {
     Recovered,
 }
 
+impl Lights {
+    /// Its value in the console.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Known => "known",
+            Self::Recovered => "recovered",
+        }
+    }
+}
+
+/// Folders for what takes time to find.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    /// Lights files.
+    pub lights: PathBuf,
+    /// Light cells.
+    pub cells: PathBuf,
+}
+
 /// What was done about a scene's lights.
 #[derive(Debug, Default)]
 pub struct Lighting {
@@ -33,6 +53,8 @@ pub struct Lighting {
     pub loaded: Option<Loaded>,
     /// Why nothing was recovered, where that was asked for; one sentence.
     pub note: Option<String>,
+    /// What could not be kept or read back, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 /// Whether a map's lights have to be looked for: the compiler keeps light entities or none at all.
@@ -43,8 +65,7 @@ fn wanted(scene: &Scene) -> bool {
         && !lights_kept_unasked(&scene.entities, &scene.lights)
 }
 
-/// Gives a loaded scene its lights, the ambient light that they leave over, and its light cells. `cache`: folder for lights
-/// files; `progress` gets the share done of a recovery, 0..1.
+/// Gives a loaded scene its lights, the ambient light that they leave over, and its light cells. `progress` gets the share done of a recovery, 0..1.
 ///
 /// # Errors
 /// [`LoadError`] where a lights file of the paks is wrong or files cannot be read.
@@ -52,7 +73,7 @@ pub fn light(
     scene: &mut Scene,
     files: &dyn FileSource,
     which: Lights,
-    cache: &Path,
+    kept: &Kept,
     options: &Options,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Lighting, LoadError> {
@@ -62,7 +83,7 @@ pub fn light(
         match load_or_recover(
             scene,
             files,
-            cache,
+            &kept.lights,
             options,
             wanted(scene) || which == Lights::Recovered,
             progress,
@@ -82,7 +103,16 @@ pub fn light(
     scene.timings.push(("recovery", start.elapsed()));
     let start = Instant::now();
     let tracer = Tracer::new(scene);
-    scene.cells = light_cells::build(scene, &tracer);
+    let cells = kept_cells::path(&kept.cells, &scene.name, which.name());
+    let (cells, warning) = kept_cells::load_or_build(scene, &tracer, &cells);
+    scene.cells = cells;
+    out.warnings.extend(
+        out.loaded
+            .as_ref()
+            .and_then(|l| l.warning.clone())
+            .into_iter()
+            .chain(warning),
+    );
     scene.timings.push(("light cells", start.elapsed()));
     let start = Instant::now();
     scene.ambient = ambient::left_over(scene, &tracer, out.loaded.as_ref().map(|l| &l.file));

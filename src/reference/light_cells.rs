@@ -17,6 +17,9 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 
+/// Changes whenever the same scene would get other cells than before: kept ones are made anew then.
+pub const VERSION: u32 = 1;
+
 /// Distance between the points of a surface that stand for its receivers, units.
 const SPACING: f32 = 24.0;
 /// Most points that a triangle gets, so that a wall of a sky box costs no more than it is worth.

@@ -2,7 +2,7 @@
 
 use super::super::args::{CliError, CliResult};
 use super::super::common::{Common, progress};
-use super::super::render::{camera, parse_size};
+use super::super::view::{at_spawn, parse_size};
 use super::frames::usual_maps;
 use super::results::{earlier, write};
 use super::{FOV, vulkan_engine};
@@ -119,7 +119,7 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &ErrorArgs) -> CliResult
         for spawn in 0..args.spawns.max(1).min(scene.spawns.len().max(1)) {
             let start = ((number * args.spawns.max(1) + spawn) * 1000) as u64;
             bar.set_position(start);
-            let view = camera(&scene, None, (!scene.spawns.is_empty()).then_some(spawn), FOV)?;
+            let view = at_spawn(&scene, (!scene.spawns.is_empty()).then_some(spawn), FOV)?;
             let hash = content_hash(&scene, &view, args.size, bench.base());
             let text = format!("{hash} {options:?} {} {}", report.run.device, report.run.build);
             let key = format!("{:016x}", fnv1a(&[text.as_bytes()]));

@@ -2,7 +2,6 @@
 
 use super::super::args::{CliError, CliResult};
 use super::super::common::{Common, progress};
-use super::super::render::camera;
 use super::frames::{FramesArgs, usual_maps};
 use super::results::write;
 use super::{FOV, vulkan_engine};
@@ -60,9 +59,9 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &FramesArgs, name: &str,
         let Prepared::Gpu(gpu) = engine.prepare(&scene).map_err(CliError::failed)? else {
             return Err(CliError::Failed("the experiments run on Vulkan devices".to_owned()));
         };
-        let view = match name == GLASS && args.camera.is_none() && args.spawn.is_none() {
+        let view = match name == GLASS && !args.view.named() {
             true => glass(&scene)?,
-            false => camera(&scene, args.camera.as_deref(), args.spawn, FOV)?,
+            false => args.view.camera(&scene, FOV)?,
         };
         let solo = (name == SOLO).then(|| args.light.unwrap_or_else(|| strongest_light(&scene, &view)));
         let making = Making {

@@ -2,7 +2,7 @@
 
 use super::super::args::{CliError, CliResult};
 use super::super::common::{Common, progress};
-use super::super::render::parse_size;
+use super::super::view::{ViewArgs, parse_size};
 use super::results::{earlier, write};
 use super::{DEFAULT_MAPS, vulkan_engine};
 use crate::bench::figures::TRUTH;
@@ -46,17 +46,8 @@ pub(super) struct FramesArgs {
     /// Measure again what an interrupted or earlier run of the same kind has left in the folder
     #[arg(long)]
     fresh: bool,
-    /// For fig7.N: eye and angles X,Y,Z,PITCH,YAW[,ROLL]
-    #[arg(
-        long,
-        value_name = "X,Y,Z,PITCH,YAW[,ROLL]",
-        allow_hyphen_values = true,
-        conflicts_with = "spawn"
-    )]
-    pub(super) camera: Option<String>,
-    /// For fig7.N: spawn point to look from
-    #[arg(long, value_name = "N")]
-    pub(super) spawn: Option<usize>,
+    #[command(flatten, next_help_heading = "View of fig7.N and sec7.5")]
+    pub(super) view: ViewArgs,
     /// For fig7.12: the light that lights alone, by its number; without it the one that gives the view most
     #[arg(long, value_name = "N")]
     pub(super) light: Option<u32>,

@@ -2,7 +2,7 @@
 
 use super::super::args::{CliError, CliResult};
 use super::super::common::{Common, progress};
-use super::super::render::{camera, parse_size};
+use super::super::view::{at_spawn, parse_size};
 use super::{FOV, keep, vulkan};
 use crate::bench::lights::{LightsBench, Options};
 use crate::bench::lights_plot;
@@ -70,7 +70,7 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &LightsArgs) -> CliResul
     };
     for map in &args.maps {
         let (scene, _) = common.lit_scene(map, cvars)?;
-        let view = camera(&scene, None, None, FOV)?;
+        let view = at_spawn(&scene, None, FOV)?;
         let gpu = SceneGpu::new(&device, &scene, backend, BvhQuality::Balanced).map_err(CliError::failed)?;
         let bench = LightsBench::new(Arc::new(gpu), view, &settings(cvars), options).map_err(CliError::failed)?;
         let bar = progress(0, map);

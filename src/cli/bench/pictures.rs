@@ -2,7 +2,7 @@
 
 use super::super::args::{CliError, CliResult};
 use super::super::common::{Common, progress};
-use super::super::render::{camera, parse_size};
+use super::super::view::{at_spawn, parse_size};
 use super::{FOV, keep, vulkan};
 use crate::bench::bandwidth::copy_bandwidth;
 use crate::bench::denoiser_report::{CullingTable, DenoiserReport, MotionTable};
@@ -76,7 +76,7 @@ pub(super) fn denoiser(common: &Common, cvars: &Cvars, args: &PictureArgs) -> Cl
     let mut views = Vec::new();
     let (device, driver) = each_map(common, cvars, args, "denoiser", |map, scene, stage| {
         for spawn in 0..args.spawns.min(scene.spawns.len()) {
-            let view = camera(scene, None, Some(spawn), FOV)?;
+            let view = at_spawn(scene, Some(spawn), FOV)?;
             views.push(denoiser::run(stage, map, spawn, &view).map_err(CliError::failed)?);
             // What is measured is kept, also where a later view fails.
             keep(args.json.as_deref(), &views)?;
@@ -120,7 +120,7 @@ pub(super) fn motion(common: &Common, cvars: &Cvars, args: &PictureArgs) -> CliR
 pub(super) fn culling(common: &Common, cvars: &Cvars, args: &PictureArgs) -> CliResult {
     let mut maps = Vec::new();
     let (device, driver) = each_map(common, cvars, args, "culling", |map, scene, stage| {
-        let view = camera(scene, None, None, FOV)?;
+        let view = at_spawn(scene, None, FOV)?;
         let lights = scene.lights.lights.len();
         maps.push(culling::run(stage, map, lights, &view).map_err(CliError::failed)?);
         keep(args.json.as_deref(), &maps)

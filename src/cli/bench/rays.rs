@@ -2,7 +2,7 @@
 
 use super::super::args::{CliError, CliResult};
 use super::super::common::{Common, progress};
-use super::super::render::{camera, parse_size};
+use super::super::view::{at_spawn, parse_size};
 use super::{DEFAULT_MAPS, FOV, keep, vulkan};
 use crate::bench::ray_report::{MOST_DISAGREEMENT, RaysReport};
 use crate::bench::rays::{EYE_JITTER, RaysBench, RaysOptions};
@@ -72,7 +72,7 @@ pub(super) fn run(common: &Common, cvars: &Cvars, args: &RaysArgs) -> CliResult 
     };
     for map in &args.maps {
         let scene = common.scene(map)?;
-        let mut view = camera(&scene, None, None, FOV)?;
+        let mut view = at_spawn(&scene, None, FOV)?;
         view.eye = std::array::from_fn(|i| view.eye[i] + EYE_JITTER[i]);
         let gpu = SceneGpu::new(&device, &scene, backend, quality).map_err(CliError::failed)?;
         let bench = RaysBench::new(&scene, &gpu, &view, options, seed).map_err(CliError::failed)?;
