@@ -65,7 +65,8 @@ fn wanted(scene: &Scene) -> bool {
         && !lights_kept_unasked(&scene.entities, &scene.lights)
 }
 
-/// Gives a loaded scene its lights, the ambient light that they leave over, and its light cells. `progress` gets the share done of a recovery, 0..1.
+/// Gives a loaded scene its lights, the ambient light that they leave over, and its light cells. `progress` gets the share
+/// done of a recovery, 0..1.
 ///
 /// # Errors
 /// [`LoadError`] where a lights file of the paks is wrong or files cannot be read.
