@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Image size and number of frames.
 pub const SIZE: (u32, u32) = (640, 360);
 pub const FRAMES: u32 = 120;
-/// Frames of the flight; the rest refine the view at its end, which becomes the picture.
+/// Frames of the flight; in the rest the view at its end settles (denoised as in the window), which becomes the picture.
 const FLIGHT: u32 = 56;
 
 /// What a loop of frames left behind.
@@ -179,7 +179,7 @@ pub fn run(
         settings: &settings,
         count: FRAMES,
         path: &path,
-        accumulate: true,
+        accumulate: cvars.number("rt_accumulate") != 0.0,
         frame_time: 0.0,
     };
     let run = run_frames(&prepared, &job, progress, &|text| eprintln!("{text}"))?;
