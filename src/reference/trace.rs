@@ -15,7 +15,7 @@ use crate::scene::records::{
     Instance, Light, MATERIAL_ALPHA_TESTED, MATERIAL_FILTER, MATERIAL_LAYER, MATERIAL_SKY, Material, NONE,
     SEEN_BY_SHADOWS,
 };
-use glam::{Affine3A, DVec3, Mat3, Vec3};
+use glam::{Affine3A, DVec3, Mat3, Vec3, Vec3A};
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
 use std::cell::Cell;
@@ -44,6 +44,8 @@ impl Hit {
 pub struct Tracer {
     trees: Arc<Vec<CwBvh>>,
     pub instances: Vec<Instance>,
+    /// Of each instance, world space.
+    bounds: Vec<Bounds>,
     pub clock: Clock,
     /// Glossy stages reflect.
     pub glossy: bool,
@@ -55,6 +57,46 @@ pub struct Tracer {
     lights: Arc<Vec<u32>>,
     /// Dynamic vertices at the moment.
     moved: Vec<Moved>,
+}
+
+/// A box in world space that holds an instance, larger than it by more than rounding can be off.
+#[derive(Clone, Copy)]
+struct Bounds {
+    least: Vec3A,
+    most: Vec3A,
+}
+
+impl Bounds {
+    /// Slack, units, and relative to the largest coordinate.
+    const SLACK: f32 = 0.1;
+    const RELATIVE_SLACK: f32 = 4e-6;
+
+    fn of(tree: &CwBvh, instance: &Instance) -> Self {
+        let (min, max) = (tree.total_aabb.min, tree.total_aabb.max);
+        let (middle, half) = (Vec3::from(0.5 * (min + max)), Vec3::from(0.5 * (max - min)));
+        let extent = instance.object_to_world.map(|[x, y, z, _]| Vec3::new(x, y, z).abs().dot(half));
+        let (middle, extent) = (Vec3A::from(point_to_world(instance, middle)), Vec3A::from(extent));
+        let largest = (middle.abs() + extent).max_element();
+        let extent = extent + Self::SLACK + Self::RELATIVE_SLACK * largest;
+        Self {
+            least: middle - extent,
+            most: middle + extent,
+        }
+    }
+
+    /// Whether a ray may meet what is in the box at 0 < t < `t_max`: slabs (Kay and Kajiya 1986) with room for rounding (Ize
+    /// 2013). No component of `inverse` is infinite.
+    fn met(&self, origin: Vec3A, inverse: Vec3A, t_max: f32) -> bool {
+        let (a, b) = ((self.least - origin) * inverse, (self.most - origin) * inverse);
+        let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+        far >= 0.0 && near <= far * 1.000_001 && near <= t_max
+    }
+}
+
+/// 1 over a direction, finite where it has none in a component.
+fn finite_inverse(direction: Vec3A) -> Vec3A {
+    const LEAST: f32 = 1e-30;
+    Vec3A::select(direction.abs().cmplt(Vec3A::splat(LEAST)), Vec3A::splat(LEAST), direction).recip()
 }
 
 /// What a ray looks for.
@@ -82,6 +124,11 @@ fn instances(scene: &Scene, moment: &Moment, states: &[EntityState]) -> Vec<Inst
     let mut records: Vec<Instance> = scene.placements.iter().map(record).collect();
     apply([states, states], &scene.placements, &mut records);
     records
+}
+
+fn bounds(trees: &[CwBvh], instances: &[Instance]) -> Vec<Bounds> {
+    let of = |i: &Instance| Bounds::of(&trees[i.mesh as usize], i);
+    instances.iter().map(of).collect()
 }
 
 /// What is between two points.
@@ -137,8 +184,10 @@ impl Tracer {
     /// Builds the trees of a scene.
     pub fn new(scene: &Scene) -> Self {
         let instances = instances(scene, &Clock::default().into(), &[]);
+        let trees = Arc::new(build_cwbvhs(&scene.geometry));
         Self {
-            trees: Arc::new(build_cwbvhs(&scene.geometry)),
+            bounds: bounds(&trees, &instances),
+            trees,
             clock: Clock::default(),
             glossy: false,
             guests: Vec::new(),
@@ -155,6 +204,7 @@ impl Tracer {
         let instances = instances(scene, &settings.moment(camera), &self.states);
         Self {
             trees: self.trees.clone(),
+            bounds: bounds(&self.trees, &instances),
             clock,
             glossy: settings.reflects(),
             guests: guests(&self.guests, camera, settings.flashlight),
@@ -212,7 +262,11 @@ impl Tracer {
     fn visit(&self, scene: &Scene, origin: Vec3, direction: Vec3, t_max: f64, wanted: &Wanted<'_>) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut limit = t_max;
-        for (index, instance) in self.instances.iter().enumerate() {
+        let (from, inverse) = (Vec3A::from(origin), finite_inverse(direction.into()));
+        for (index, (instance, bounds)) in self.instances.iter().zip(&self.bounds).enumerate() {
+            if !bounds.met(from, inverse, next_up(limit)) {
+                continue;
+            }
             let mesh = &scene.geometry.meshes[instance.mesh as usize];
             if mesh.triangle_count == 0 || instance.seen_by & wanted.kind() == 0 {
                 continue;
