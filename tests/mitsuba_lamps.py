@@ -12,6 +12,26 @@ CELL = 128.0
 MOST_LAMPS = 64
 
 
+class MetFaces:
+    """Faces of lamps that rays meet one after another, of one half of all directions that they may face: the two sides of a
+    sheet of water or lava are two lamps in the same place, of which a ray through one scene would meet one.
+    """
+
+    def __init__(self, met, half):
+        kept = []
+        for emitter, p, uv, both in met:
+            corners = p.reshape(-1, 3, 3)
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            mine = np.repeat((normal @ [0.1234, 0.3456, 1.0] < 0) == half, 3)
+            kept.append((emitter, p[mine], uv[mine], both))
+        each = lambda k: mi.UInt(np.concatenate([np.full(len(m[1]) // 3, m[k], np.uint32) for m in kept]))  # noqa: E731
+        self.count = sum(len(m[1]) for m in kept) // 3
+        if self.count:
+            p, uv = (np.concatenate([m[k] for m in kept]) for k in (1, 2))
+            self.scene = mi.load_dict({"type": "scene", "faces": to_mesh("faces", p, uv)})
+            self.emitter, self.both = each(0), each(3)
+
+
 class Lamps:
     """Area lights (meshes of one radiance, a picture or a sky box over it) and spheres."""
 
@@ -60,10 +80,7 @@ class Lamps:
         self.count = len(self.makes)
         self.kinds = [mi.UInt(np.array(k, np.uint32)) for k in zip(*self.kinds)]
         if self.met:
-            joined = [np.concatenate([m[k] for m in self.met]) for k in (1, 2)]
-            self.met_scene = mi.load_dict({"type": "scene", "faces": to_mesh("faces", joined[0], joined[1])})
-            each = lambda k: mi.UInt(np.concatenate([np.full(len(m[1]) // 3, m[k], np.uint32) for m in self.met]))  # noqa: E731
-            self.met_emitter, self.met_both = each(0), each(3)
+            self.met_groups = [MetFaces(self.met, half) for half in (False, True)]
             faces = [make if isinstance(make, tuple) else ((0, 0, 0), 0, 0, 1) for make in self.makes]
             self.radiance = [mi.Float([float(f[0][c]) for f in faces]) for c in range(3)]
             self.areas = [f[3] for f in faces]
@@ -132,18 +149,22 @@ class Lamps:
 
     def chance(self, ray, cosine, end, active):
         """Light of the faces of lamps along a ray drawn in proportion to the cosine, up to its end: contribution/pi."""
+        return sum((self.chance_of(g, ray, cosine, end, active) for g in self.met_groups if g.count), mi.Color3f(0))
+
+    def chance_of(self, met, ray, cosine, end, active):
+        """The same of one group of faces."""
         total, start = mi.Color3f(0), mi.Float(0)
         active = mi.Bool(active)
         origin = mi.Point3f(ray.o)
         for _ in range(MOST_LAMPS):
             step = mi.Ray3f(origin + ray.d * start, ray.d)
-            pi = self.met_scene.ray_intersect_preliminary(step, False, active)
+            pi = met.scene.ray_intersect_preliminary(step, False, active)
             # The lamp's own face ends the ray as often as not: as much too short as Mitsuba's rays to points are.
             active &= pi.is_valid() & ((start + pi.t) * (1 - 1e-3) < end)
-            which = dr.gather(mi.UInt, self.met_emitter, pi.prim_index, active)
+            which = dr.gather(mi.UInt, met.emitter, pi.prim_index, active)
             si = pi.compute_surface_interaction(step, mi.RayFlags.UV, active)
             facing = -dr.dot(si.n, ray.d)
-            shines = active & ((facing > 0) | (dr.gather(mi.UInt, self.met_both, pi.prim_index, active) != 0))
+            shines = active & ((facing > 0) | (dr.gather(mi.UInt, met.both, pi.prim_index, active) != 0))
             value = mi.Color3f(*(dr.gather(mi.Float, c, which, shines) for c in self.radiance))
             picture = dr.gather(mi.UInt, self.kinds[0], which, shines)
             for i, texture in enumerate(self.pictures):
