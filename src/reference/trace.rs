@@ -74,7 +74,9 @@ impl Bounds {
     fn of(tree: &CwBvh, instance: &Instance) -> Self {
         let (min, max) = (tree.total_aabb.min, tree.total_aabb.max);
         let (middle, half) = (Vec3::from(0.5 * (min + max)), Vec3::from(0.5 * (max - min)));
-        let extent = instance.object_to_world.map(|[x, y, z, _]| Vec3::new(x, y, z).abs().dot(half));
+        let extent = instance
+            .object_to_world
+            .map(|[x, y, z, _]| Vec3::new(x, y, z).abs().dot(half));
         let (middle, extent) = (Vec3A::from(point_to_world(instance, middle)), Vec3A::from(extent));
         let largest = (middle.abs() + extent).max_element();
         let extent = extent + Self::SLACK + Self::RELATIVE_SLACK * largest;
@@ -96,7 +98,12 @@ impl Bounds {
 /// 1 over a direction, finite where it has none in a component.
 fn finite_inverse(direction: Vec3A) -> Vec3A {
     const LEAST: f32 = 1e-30;
-    Vec3A::select(direction.abs().cmplt(Vec3A::splat(LEAST)), Vec3A::splat(LEAST), direction).recip()
+    Vec3A::select(
+        direction.abs().cmplt(Vec3A::splat(LEAST)),
+        Vec3A::splat(LEAST),
+        direction,
+    )
+    .recip()
 }
 
 /// What a ray looks for.
