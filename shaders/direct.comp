@@ -23,6 +23,7 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     uvec2 counts = uvec2(0);
     drawn_index = sample_index;
+    drawn_least = FC.least_candidates;
     if (all(lessThan(pixel, FC.size))) {
         ivec2 p = ivec2(pixel);
         vec4 albedo = imageLoad(gbuffer_albedo, p);

@@ -44,6 +44,7 @@ vec2 change_of(uvec2 stratum, inout uvec2 counts) {
         now = luminance(traced(s, at, counts)) * kept.weight;
     } else {
         drawn_index = kept.sample_index;
+        drawn_least = FC.old_least_candidates;
         now = luminance(direct_light(at, kept.address, counts));
     }
     // What one device computes twice from the same numbers is the same but for the order of operations.

@@ -46,11 +46,11 @@ void resample(SurfaceHit at, float distance, uint address, inout Reservoir kept,
     LightPoint point = NO_POINT;
     float target = 0.0;
     float sum = 0.0;
+    uint pick = random_bits(address, DIM_CANDIDATE_PICK).x;
+    uvec2 u = random_bits(address, DIM_CANDIDATE_POINT);
     [[dont_unroll]] for (uint c = 0; c < n; c++) {
-        uvec2 bits = random_bits(address, DIM_CANDIDATE_PICK + c);
-        Choice choice = choose_light(chances, at, bits.x);
+        Choice choice = choose_light(chances, at, stratified(pick, c, n));
         if (choice.light == NONE) continue;
-        uvec2 u = random_bits(address, DIM_CANDIDATE_POINT + c);
         LightPoint candidate = LightPoint(choice.light, vec2(unit_float(u.x), unit_float(u.y)));
         float t = luminance(sample_point(candidate, at).value);
         if (!(t > 0.0)) continue;

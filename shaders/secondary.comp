@@ -76,6 +76,7 @@ vec4 branches_of(uvec2 pixel, inout uvec2 counts) {
 void main() {
     begin_counting();
     drawn_index = sample_index;
+    drawn_least = FC.least_candidates;
     uvec2 counts = uvec2(0);
     uint i = gl_GlobalInvocationID.x;
     if (i < FC.secondary_pixels.count) {

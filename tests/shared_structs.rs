@@ -350,6 +350,8 @@ fn records() -> Vec<Record> {
             random_lights,
             light_sampling,
             light_candidates,
+            least_candidates,
+            old_least_candidates,
             finite_lights,
             soft_shadows,
             antialiasing,

@@ -14,15 +14,16 @@ const uint NO_SUCH_LIGHT = 0xfffffffeu;
 
 // Number of the sample whose random numbers are drawn: the frame's, or the one that is shaded again.
 uint drawn_index;
+// Least number of candidates for it.
+uint drawn_least;
 
 uvec2 random_bits(uint address, uint dimension) {
     return bits2(FC.sequence, random_key(FC.seed, address, dimension), drawn_index);
 }
 
-LightSample sampled(uint light, uint dimension, uint address, SurfaceHit at, uint points) {
+vec2 random_pair(uint address, uint dimension) {
     uvec2 bits = random_bits(address, dimension);
-    vec2 u = vec2(unit_float(bits.x), unit_float(bits.y));
-    return sample_light(light_at(light), at, u, points);
+    return vec2(unit_float(bits.x), unit_float(bits.y));
 }
 
 #ifdef LIGHTS_LOBES
@@ -81,7 +82,8 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
 #else
     uint candidates = FC.light_candidates;
 #endif
-    uint n = resampled ? clamp(candidates, 1, MAX_CANDIDATES) : 1;
+    if (chances.cell.count > MANY_ENTRIES) candidates *= 2;
+    uint n = resampled ? clamp(max(candidates, drawn_least), 1, MAX_CANDIDATES) : 1;
     float share = every ? 1.0 : 1.0 / float(FC.random_lights);
     uint r = 0;
     uint in_run = 0;
@@ -99,48 +101,59 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
         LightSample kept = LightSample(vec3(0.0), 0.0, vec3(0.0), false);
         float kept_target = 0.0;
         float weights = 0.0;
+        bool at_random = for_lobe || !every;
+        uvec2 bits = uvec2(0);
+        vec2 u = vec2(0.0);
+        if (at_random) {
+            uint pick = DIM_LIGHT_PICK + i;
+            uint point = DIM_LIGHT_POINT + i;
+            if (resampled) {
+                pick = DIM_CANDIDATE_PICK + i;
+                point = DIM_CANDIDATE_POINT + i;
+            }
+#ifdef LIGHTS_LOBES
+            if (for_lobe) {
+                pick = DIM_LOBE_PICK;
+                point = DIM_LOBE_POINT;
+            }
+#endif
+            bits = random_bits(address, pick);
+            u = random_pair(address, point);
+        }
         [[dont_unroll]] for (uint c = 0; c < (for_lobe ? 1 : n); c++) {
             Choice choice;
-            uint dimension;
             float keep = 0.0;
             uint points = point_sampling();
 #ifdef LIGHTS_LOBES
             if (for_lobe) {
-                choice = choose_for_lobe(row, lobe_cell(at.row, light_cell_place(at.position, at.geometric_normal)),
-                                         random_bits(address, DIM_LOBE_PICK).x);
+                choice = choose_for_lobe(row, lobe_cell(at.row, light_cell_place(at.position, at.geometric_normal)), bits.x);
                 if (solo) choice = Choice(FC.solo_light, 1.0);
                 if (choice.light == NONE) continue;
-                dimension = DIM_LOBE_POINT;
                 if (points == POINTS_SOLID_ANGLE) points = POINTS_AREA;
             } else
 #endif
             if (solo) {
                 choice = Choice(FC.solo_light, 1.0);
-                dimension = DIM_EVERY_LIGHT + choice.light;
             } else if (every && i >= row.light_count) {
                 choice.light = GUEST_LIGHT + (i - row.light_count);
                 choice.probability = 1.0;
-                dimension = DIM_EVERY_LIGHT + choice.light;
             } else if (every) {
                 LightRun run = FC.light_runs.at[row.first_run + r];
                 choice.light = run.first_light + in_run;
                 choice.probability = 1.0;
-                dimension = DIM_EVERY_LIGHT + choice.light;
                 in_run++;
                 if (in_run >= run.count) {
                     in_run = 0;
                     r++;
                 }
             } else {
-                uint at_ = resampled ? DIM_CANDIDATE_PICK + i * MAX_CANDIDATES + c : DIM_LIGHT_PICK + i;
-                uvec2 bits = random_bits(address, at_);
-                choice = choose_light(chances, at, bits.x);
+                choice = choose_light(chances, at, stratified(bits.x, c, n));
                 if (choice.light == NONE) continue;
-                dimension = resampled ? DIM_CANDIDATE_POINT + i * MAX_CANDIDATES + c : DIM_LIGHT_POINT + i;
-                keep = unit_float(bits.y);
+                keep = unit_float(keep_bits(bits.y, c));
             }
             picked = choice;
-            LightSample s = sampled(choice.light, dimension, address, at, points);
+            if (!at_random) u = random_pair(address, DIM_EVERY_LIGHT + choice.light);
+            LightSample s = sample_light(light_at(choice.light), at, u, points);
             float target = luminance(s.value);
             if (!(target > 0.0)) continue;
             float weight = target / choice.probability;

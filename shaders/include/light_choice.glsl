@@ -251,6 +251,9 @@ uint light_cell_place(vec3 position, vec3 normal) {
 }
 
 // The light cell of a receiver; one without entries where there is none.
+// Cells of more entries get twice the candidates.
+const uint MANY_ENTRIES = 64;
+
 LightCell find_light_cell(uint row, uint place) {
     LightCell none = LightCell(0, 0, 0, 0);
     if (FC.cell_mask == NONE) return none;

@@ -38,18 +38,12 @@ uint laine_karras(uint x, uint seed) {
     return x;
 }
 
-uint owen(uint x, uint seed) {
-    return bitfieldReverse(laine_karras(bitfieldReverse(x), seed));
-}
-
-uint sobol1(uint index) {
-    uint v = 1u << 31;
-    uint x = 0;
-    while (index != 0) {
-        if ((index & 1u) == 1u) x ^= v;
-        index >>= 1;
-        v ^= v >> 1;
-    }
+uint sobol1_reversed(uint x) {
+    x ^= (x >> 16) & 0x0000ffffu;
+    x ^= (x >> 8) & 0x00ff00ffu;
+    x ^= (x >> 4) & 0x0f0f0f0fu;
+    x ^= (x >> 2) & 0x33333333u;
+    x ^= (x >> 1) & 0x55555555u;
     return x;
 }
 
@@ -62,10 +56,21 @@ uvec2 bits2(uint sequence, uint key, uint index) {
         uint a = pcg(key ^ pcg(index));
         return uvec2(a, pcg(a ^ ((key << 16) | (key >> 16))));
     }
-    uint shuffled = owen(index, key);
-    uint x = owen(bitfieldReverse(shuffled), pcg(key ^ 0x68bc21ebu));
-    uint y = owen(sobol1(shuffled), pcg(key ^ 0x02e5be93u));
-    return uvec2(x, y);
+    uint shuffled = bitfieldReverse(laine_karras(bitfieldReverse(index), key));
+    uint x = laine_karras(shuffled, pcg(key ^ 0x68bc21ebu));
+    uint y = laine_karras(sobol1_reversed(shuffled), pcg(key ^ 0x02e5be93u));
+    return uvec2(bitfieldReverse(x), bitfieldReverse(y));
+}
+
+uint stratified(uint bits, uint part, uint parts) {
+    uint whole = (0u - parts) / parts + 1u;
+    uint rest = (0u - parts) % parts;
+    return part * whole + bits / parts + (part * rest + bits % parts) / parts;
+}
+
+// Bits that decide whether the c-th candidate is kept.
+uint keep_bits(uint bits, uint c) {
+    return c < 2 ? bits : pcg(bits + c);
 }
 
 vec2 sample2(uint sequence, uint key, uint index) {

@@ -420,6 +420,8 @@ struct FrameConstants {
     uint random_lights;
     uint light_sampling;
     uint light_candidates;
+    uint least_candidates;
+    uint old_least_candidates;
     uint finite_lights;
     uint soft_shadows;
     uint antialiasing;

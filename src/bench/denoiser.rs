@@ -1,8 +1,9 @@
 //! What the denoiser makes of one light sample per pixel: error against two references after some frames of a view that stands
 //! still and of one that moves, beside the raw frame, and the time of its passes.
 
-use super::references::{Pixels, References};
+use super::references::Pixels;
 use super::stage::{Figures, Stage};
+use super::truth::Truth;
 use crate::render::scene_gpu::RenderError;
 use crate::render::settings::Settings;
 use crate::scene::camera::Camera;
@@ -21,12 +22,18 @@ pub const RAW: u32 = 128;
 const RUNS: u32 = 4;
 /// Frames whose times are taken.
 const TIMED: u32 = 40;
+/// The references' noise is to be this share of the least error: SSIM and FLIP cannot be had without it.
+const QUIET: f64 = 0.1;
+/// Most times as many samples as asked for that references get for it.
+const MOST_TIMES: u32 = 16;
+
 /// The measurements of a view.
 #[derive(Clone, Debug, Serialize)]
 pub struct ViewReport {
     pub map: String,
     pub spawn: usize,
-    /// Relative squared error of one reference.
+    /// Samples of each reference, and the relative squared error of the mean of both.
+    pub references: u32,
     pub reference_error: f64,
     /// One frame as it comes, and the mean of [`RAW`].
     pub raw: Figures,
@@ -40,24 +47,17 @@ pub struct ViewReport {
     pub moving_passes: BTreeMap<String, f64>,
 }
 
-/// Mean of the figures of raw images of so many samples.
-fn raw(
-    stage: &mut Stage,
-    camera: &Camera,
-    samples: u32,
-    runs: u32,
-    truth: &References,
-) -> Result<Figures, RenderError> {
-    let mut figures = Vec::new();
-    for run in 0..runs {
-        let settings = Settings {
-            seed: stage.base.seed.wrapping_add(run),
-            ..stage.base
-        };
-        let image = stage.accumulated(camera, &settings, samples)?;
-        figures.push(stage.figures(&image, truth));
-    }
-    Ok(Figures::mean(&figures))
+/// Raw images of so many samples, each with other random numbers.
+fn raw(stage: &mut Stage, camera: &Camera, samples: u32, runs: u32) -> Result<Vec<Pixels>, RenderError> {
+    (0..runs)
+        .map(|run| {
+            let settings = Settings {
+                seed: stage.base.seed.wrapping_add(run),
+                ..stage.base
+            };
+            stage.accumulated(camera, &settings, samples)
+        })
+        .collect()
 }
 
 /// The image after so many frames along a path; histories begin with it.
@@ -100,13 +100,11 @@ fn times(stage: &mut Stage, path: &dyn Fn(u32) -> Camera) -> Result<BTreeMap<Str
 /// # Errors
 /// [`RenderError`] of the device.
 pub fn run(stage: &mut Stage, map: &str, spawn: usize, camera: &Camera) -> Result<ViewReport, RenderError> {
-    let truth = stage.references(camera)?;
-    let raw_one = raw(stage, camera, 1, RUNS, &truth)?;
-    let raw_many = raw(stage, camera, RAW, 1, &truth)?;
-    let mut still = [raw_one; 2];
-    for (figures, frames) in still.iter_mut().zip(STILL) {
-        let image = shown(stage, frames, &|_| *camera)?;
-        *figures = stage.figures(&image, &truth);
+    let raw_one = raw(stage, camera, 1, RUNS)?;
+    let raw_many = raw(stage, camera, RAW, 1)?;
+    let mut still = [Vec::new(), Vec::new()];
+    for (image, frames) in still.iter_mut().zip(STILL) {
+        *image = shown(stage, frames, &|_| *camera)?;
     }
     // The moving view ends where the still one stands, so that the truth is the same.
     let right = camera.axes().right;
@@ -117,16 +115,31 @@ pub fn run(stage: &mut Stage, map: &str, spawn: usize, camera: &Camera) -> Resul
         c.yaw -= TURN * left;
         c
     };
-    let image = shown(stage, MOVING, &path)?;
-    let moved = stage.figures(&image, &truth);
+    let moved = shown(stage, MOVING, &path)?;
+    // Each of the two truths is made of two parts.
+    let asked = (stage.references / 2).max(1);
+    let mut truth = Truth::new(stage, camera, asked)?;
+    while truth.samples < asked * MOST_TIMES {
+        let least = [&still[0], &still[1], &moved].map(|image| truth.error(image).rel_mse);
+        if 0.5 * truth.references.own_error() <= QUIET * least.into_iter().fold(f64::INFINITY, f64::min) {
+            break;
+        }
+        truth = truth.refine(stage, camera)?;
+    }
+    let references = &truth.references;
+    let figures = |images: &[Pixels]| {
+        let figures: Vec<Figures> = images.iter().map(|i| stage.figures(i, references)).collect();
+        Figures::mean(&figures)
+    };
     Ok(ViewReport {
         map: map.to_owned(),
         spawn,
-        reference_error: truth.own_error(),
-        raw: raw_one,
-        raw_many,
-        still,
-        moved,
+        references: truth.samples * 2,
+        reference_error: 0.5 * references.own_error(),
+        raw: figures(&raw_one),
+        raw_many: figures(&raw_many),
+        still: still.each_ref().map(|i| stage.figures(i, references)),
+        moved: stage.figures(&moved, references),
         passes: times(stage, &|_| *camera)?,
         moving_passes: times(stage, &path)?,
     })

@@ -28,10 +28,10 @@ impl fmt::Display for DenoiserReport {
         )?;
         writeln!(
             f,
-            "\n| map, spawn | raw 1 | raw {RAW} | still {} | still {} | SSIM, FLIP, mean | moving {MOVING} | SSIM, FLIP, mean |",
+            "\n| map, spawn | raw 1 | raw {RAW} | still {} | still {} | SSIM, FLIP, mean | moving {MOVING} | SSIM, FLIP, mean | references: samples, error |",
             STILL[0], STILL[1]
         )?;
-        writeln!(f, "|---|---:|---:|---:|---:|---|---:|---|")?;
+        writeln!(f, "|---|---:|---:|---:|---:|---|---:|---|---|")?;
         for v in &self.views {
             let ratio = |e: f64, t: f64| {
                 format!(
@@ -44,7 +44,7 @@ impl fmt::Display for DenoiserReport {
             let looks = |x: &Figures| format!("{:.3}, {:.3}, {:.3}", x.ssim, x.flip, x.mean_ratio);
             writeln!(
                 f,
-                "| {}, {} | {:.2e} ({:.2e}) | {:.2e} ({:.2e}) | {} | {} | {} | {} | {} |",
+                "| {}, {} | {:.2e} ({:.2e}) | {:.2e} ({:.2e}) | {} | {} | {} | {} | {} | {}, {:.1e} |",
                 v.map,
                 v.spawn,
                 v.raw.rel_mse,
@@ -55,7 +55,9 @@ impl fmt::Display for DenoiserReport {
                 ratio(b.rel_mse, b.rel_mse_trimmed),
                 looks(&b),
                 ratio(v.moved.rel_mse, v.moved.rel_mse_trimmed),
-                looks(&v.moved)
+                looks(&v.moved),
+                v.references,
+                v.reference_error
             )?;
         }
         let Some(bandwidth) = self.copy_bandwidth else {

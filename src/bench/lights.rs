@@ -160,11 +160,11 @@ const APART: u32 = 8;
 /// Runs with other random numbers for the mean of a mode, and their length in frames.
 const RUNS: u32 = 16;
 const RUN_FRAMES: u32 = 6;
-/// What references take of each sample.
+/// What references take of each sample. Candidates are cheaper than rays, and on maps of many small lamps worth more.
 pub(super) const REFERENCE: Config = Config {
     mode: Mode::Resampled,
     lights: 4,
-    candidates: 4,
+    candidates: 8,
     neighbours: 0,
 };
 const PASSES: [&str; 3] = ["direct", "resample", "reuse"];

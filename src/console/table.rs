@@ -275,7 +275,8 @@ pub const CVARS: &[Cvar] = &[
         2,
         1,
         32,
-        "candidates per random light with rt_lightSampling reservoir",
+        "candidates per random light with rt_lightSampling reservoir; twice as many where more than 64 lights or groups of them compete, \
+         and 8 at least in the first frames of a denoised view",
     ),
     int(
         "rt_lightReuse",

@@ -18,7 +18,7 @@ use crate::scene::optics::Lobe;
 use crate::scene::records::{LIGHT_DOME, LIGHT_SPHERE, LIGHT_TRIANGLE};
 use crate::scene::sampling::{
     DIM_CANDIDATE_PICK, DIM_CANDIDATE_POINT, DIM_EVERY_LIGHT, DIM_LIGHT_PICK, DIM_LIGHT_POINT, DIM_LOBE_PICK,
-    DIM_LOBE_POINT, MAX_CANDIDATES, bits2, key, unit,
+    DIM_LOBE_POINT, MAX_CANDIDATES, bits2, keep_bits, key, stratified, unit,
 };
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -262,8 +262,11 @@ impl<'a> Estimator<'a> {
     }
 
     fn sample(&self, light: u32, dimension: u32) -> Option<LightSample> {
+        self.sample_at(light, self.bits(dimension).map(unit))
+    }
+
+    fn sample_at(&self, light: u32, u: [f32; 2]) -> Option<LightSample> {
         let record = self.tracer.light(self.scene, light);
-        let u = self.bits(dimension).map(unit);
         sample_light(self.scene, &record, self.at, u, self.points)
     }
 
@@ -306,31 +309,34 @@ impl<'a> Estimator<'a> {
     }
 
     /// One light resampled from candidates in proportion to what they give without visibility (Talbot, Cline and Egbert
-    /// 2005, "Importance Resampling for Global Illumination").
+    /// 2005, "Importance Resampling for Global Illumination"). The candidates stratify one random number, and all are looked at
+    /// where another pair says: the mean needs no more of them than that each by itself is as likely as its probability says.
     fn resampled(&self, chances: &Chances<'_>, i: u32, steps: i32) -> Option<Taken> {
-        let n = self.settings.candidates.clamp(1, MAX_CANDIDATES);
+        let n = self.settings.candidates * if chances.many() { 2 } else { 1 };
+        let n = n.clamp(1, MAX_CANDIDATES);
+        let [pick, keep] = self.bits(DIM_CANDIDATE_PICK + i);
+        let u = self.bits(DIM_CANDIDATE_POINT + i).map(unit);
         let (mut kept, mut kept_target, mut sum) = (None, 0.0, 0.0);
-        for c in i * MAX_CANDIDATES..i * MAX_CANDIDATES + n {
-            let [pick, keep] = self
-                .bits(DIM_CANDIDATE_PICK + c)
-                .map(|b| b.saturating_add_signed(steps << 8));
+        for c in 0..n {
+            let [pick, keep] =
+                [stratified(pick, c, n), keep_bits(keep, c)].map(|b| b.saturating_add_signed(steps << 8));
             let Some(choice) = chances.choose(self.at, pick) else {
                 continue;
             };
-            let Some(sample) = self.sample(choice.light, DIM_CANDIDATE_POINT + c) else {
+            let Some(sample) = self.sample_at(choice.light, u) else {
                 continue;
             };
             let target = luminance(sample.value.into());
             let weight = target / choice.probability;
             sum += weight;
             if unit(keep) * sum < weight {
-                (kept, kept_target) = (Some((choice.light, c, sample)), target);
+                (kept, kept_target) = (Some((choice.light, sample)), target);
             }
         }
-        let (light, c, sample) = kept.filter(|_| kept_target > 0.0)?;
+        let (light, sample) = kept.filter(|_| kept_target > 0.0)?;
         Some(Taken {
             light,
-            u: self.bits(DIM_CANDIDATE_POINT + c).map(unit),
+            u,
             sample: Some(sample),
             weight: sum / (kept_target * n as f32),
         })

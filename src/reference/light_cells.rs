@@ -18,22 +18,21 @@ use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 
 /// Changes whenever the same scene would get other cells than before: kept ones are made anew then.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Distance between the points of a surface that stand for its receivers, units.
 const SPACING: f32 = 24.0;
 /// Most points that a triangle gets, so that a wall of a sky box costs no more than it is worth.
 const MOST_POINTS: u32 = 4096;
 /// Points that stand for the receivers of a cell.
-const RECEIVERS: usize = 12;
+const RECEIVERS: usize = 24;
 /// Lights of a cell that are looked at one by one, suns apart. Where there are more, those that promise least are looked at in
 /// the tree's groups.
 const MOST_SEEN: usize = 1024;
 /// Most entries of a cell, suns apart.
-const MOST_ENTRIES: usize = 64;
-/// Traced samples that a cell's lights get at first, together and each at most.
-const FIRST_SAMPLES: usize = 768;
-const MOST_FIRST_SAMPLES: usize = 4;
+const MOST_ENTRIES: usize = 128;
+/// Traced samples that each of a cell's lights gets at first.
+const FIRST_SAMPLES: u32 = 4;
 /// Traced samples of a light in the end, by its share of the choices.
 const MOST_SAMPLES: u32 = 16;
 const SAMPLES_BY_SHARE: f32 = 512.0;
@@ -362,12 +361,11 @@ impl Filler<'_> {
     /// The lights of a row, with the share of each.
     fn seen(&self, weight: u32) -> Vec<Seen> {
         let mut lights = self.row(weight);
-        let first = (FIRST_SAMPLES / lights.len().max(1)).clamp(1, MOST_FIRST_SAMPLES) as u32;
-        lights.iter_mut().for_each(|l| self.look(l, first));
+        lights.iter_mut().for_each(|l| self.look(l, FIRST_SAMPLES));
         self.weigh(&mut lights);
         for light in &mut lights {
             let samples = ((light.share * SAMPLES_BY_SHARE).ceil() as u32).min(MOST_SAMPLES);
-            if samples > first {
+            if samples > FIRST_SAMPLES {
                 self.look(light, samples);
             }
         }

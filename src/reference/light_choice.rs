@@ -9,7 +9,7 @@ use crate::render::settings::{LightSampling, Settings};
 use crate::scene::Scene;
 use crate::scene::clusters::LightLists;
 use crate::scene::guests::{GUEST_LIGHT, GUEST_SHARE};
-use crate::scene::light_cells::{CellView, place};
+use crate::scene::light_cells::{CellView, MANY_ENTRIES, place};
 use crate::scene::light_power::luminance;
 use crate::scene::light_tree::LightTree;
 use crate::scene::lights::LightTable;
@@ -62,6 +62,11 @@ impl<'a> Chances<'a> {
             },
             guests,
         }
+    }
+
+    /// Whether so many lights compete for the receiver that a choice of few candidates says little.
+    pub fn many(&self) -> bool {
+        self.cell.entries.len() > MANY_ENTRIES
     }
 
     /// Chooses with 32 random bits; `None` where no light can reach the receiver, as far as the way of choosing can tell.

@@ -95,6 +95,9 @@ pub struct FrameConstants {
     pub light_sampling: u32,
     /// Candidates per random light where they are resampled.
     pub light_candidates: u32,
+    /// Fewest of them: more than that where histories have just begun. And the same of the frame before.
+    pub least_candidates: u32,
+    pub old_least_candidates: u32,
     /// Lights in the tree; suns follow.
     pub finite_lights: u32,
     pub soft_shadows: u32,

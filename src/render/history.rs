@@ -5,9 +5,18 @@ use super::frame::FrameInput;
 use super::frame_constants::FrameConstants;
 use super::settings::{Settings, Tonemap};
 use crate::scene::clock::Clock;
+use glam::Vec3;
 
 /// Frames that nothing must have changed for until temporal anti-aliasing takes the image for a still one.
 const SETTLED: u32 = 1;
+/// An eye that goes farther than this from one frame to the next, or turns by more than the angle with this cosine, sees another
+/// view, of which histories know nothing. Units; falls and jump pads are below 20 at 60 frames per second.
+const CUT_DISTANCE: f32 = 64.0;
+const CUT_COSINE: f32 = 0.866;
+/// Frames after such a cut, or a new beginning, whose light is sampled from more candidates, and from how many at least: what is
+/// seen then has no history to be quiet by.
+const FRESH_FRAMES: u32 = 8;
+const FRESH_CANDIDATES: u32 = 8;
 
 /// What histories depend on besides view and scene: when it changes they start anew.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +44,15 @@ pub struct FrameHistory {
     before: Option<(FrameConstants, Key)>,
     revision: u32,
     unchanged: u32,
+    /// Frames since histories began or the view was cut.
+    since_cut: u32,
+}
+
+/// Whether a frame shows another place than the one before.
+fn cut(old: &FrameConstants, new: &FrameConstants) -> bool {
+    let away = Vec3::from(old.eye).distance(new.eye.into());
+    let turned = |a: [f32; 3], b: [f32; 3]| Vec3::from(a).dot(b.into()) < CUT_COSINE;
+    away > CUT_DISTANCE || turned(old.forward, new.forward) || turned(old.right, new.right)
 }
 
 /// The settings that decide what is in the histories: not how they are shown.
@@ -93,7 +111,19 @@ impl FrameHistory {
             (false, false) => [-1.0; 2],
             _ => [0.5; 2],
         };
+        self.since_cut = if good && !cut(&view, &constants) {
+            self.since_cut.saturating_add(1)
+        } else {
+            0
+        };
+        let least_candidates = if input.denoises() && self.since_cut < FRESH_FRAMES {
+            FRESH_CANDIDATES
+        } else {
+            1
+        };
         let complete = FrameConstants {
+            least_candidates,
+            old_least_candidates: view.least_candidates,
             old_eye: view.eye,
             old_half_width: view.half_width,
             old_forward: view.forward,
@@ -116,6 +146,23 @@ impl FrameHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn a_cut_is_told_from_a_motion() {
+        let at = |x: f32, degrees: f32| {
+            let (s, c) = degrees.to_radians().sin_cos();
+            FrameConstants {
+                eye: [x, 0.0, 0.0],
+                forward: [c, s, 0.0],
+                right: [s, -c, 0.0],
+                ..FrameConstants::zeroed()
+            }
+        };
+        assert!(!cut(&at(0.0, 0.0), &at(17.0, 20.0)));
+        assert!(cut(&at(0.0, 0.0), &at(65.0, 0.0)));
+        assert!(cut(&at(0.0, 0.0), &at(0.0, 90.0)));
+    }
 
     #[test]
     fn jitter_fills_the_pixel() {

@@ -10,6 +10,8 @@ use glam::Vec3;
 
 /// Edge of a cube, units.
 pub const CELL_SIZE: f32 = 128.0;
+/// Cells of more entries get twice the candidates where one light of several is resampled.
+pub const MANY_ENTRIES: usize = 64;
 /// The place of a receiver is taken this far off its surface, units: walls stand on whole units and often on the cubes'
 /// borders, where rounding would tell one side from the other.
 pub const LIFT: f32 = 5.37;

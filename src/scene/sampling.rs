@@ -37,11 +37,11 @@ pub const DIM_LIGHT_PICK: u32 = 16;
 pub const DIM_LIGHT_POINT: u32 = 80;
 /// Most lights chosen at random per receiver.
 pub const MAX_RANDOM_LIGHTS: u32 = 64;
-/// Choice of the c-th candidate for the i-th random light (at place 32·i + c), and which candidate is kept.
+/// Choice of the candidates for the i-th random light, and which of them is kept.
 pub const DIM_CANDIDATE_PICK: u32 = 0x1000;
-/// Position on that candidate.
+/// Position on them, the same for all.
 pub const DIM_CANDIDATE_POINT: u32 = 0x2000;
-/// Most candidates per random light.
+/// Most candidates per random light, each of which has a number that decides whether it is kept.
 pub const MAX_CANDIDATES: u32 = 32;
 /// Reuse of samples: whether the old one is taken; then which neighbours are asked, four of them, and whether theirs are
 /// taken.
@@ -73,20 +73,15 @@ const fn laine_karras(mut x: u32, seed: u32) -> u32 {
     x
 }
 
-const fn owen(x: u32, seed: u32) -> u32 {
-    laine_karras(x.reverse_bits(), seed).reverse_bits()
-}
-
-/// Second dimension of the Sobol sequence.
-const fn sobol1(mut index: u32) -> u32 {
-    let (mut v, mut x) = (1u32 << 31, 0);
-    while index != 0 {
-        if index & 1 == 1 {
-            x ^= v;
-        }
-        index >>= 1;
-        v ^= v >> 1;
-    }
+/// Second dimension of the Sobol sequence, with its bits reversed. Its matrix is Pascal's triangle modulo 2: bit j is the sum of
+/// the index's bits k of which C(k, j) is odd, those whose k has all ones of j (Lucas).
+const fn sobol1_reversed(index: u32) -> u32 {
+    let mut x = index;
+    x ^= x >> 16 & 0x0000_ffff;
+    x ^= x >> 8 & 0x00ff_00ff;
+    x ^= x >> 4 & 0x0f0f_0f0f;
+    x ^= x >> 2 & 0x3333_3333;
+    x ^= x >> 1 & 0x5555_5555;
     x
 }
 
@@ -103,12 +98,28 @@ pub fn bits2(sequence: Sequence, key: u32, index: u32) -> [u32; 2] {
             [a, pcg(a ^ key.rotate_left(16))]
         }
         Sequence::Sobol => {
-            let shuffled = owen(index, key);
-            let x = owen(shuffled.reverse_bits(), pcg(key ^ 0x68bc_21eb));
-            let y = owen(sobol1(shuffled), pcg(key ^ 0x02e5_be93));
-            [x, y]
+            let shuffled = laine_karras(index.reverse_bits(), key).reverse_bits();
+            let x = laine_karras(shuffled, pcg(key ^ 0x68bc_21eb));
+            let y = laine_karras(sobol1_reversed(shuffled), pcg(key ^ 0x02e5_be93));
+            [x.reverse_bits(), y.reverse_bits()]
         }
     }
+}
+
+/// The `part`-th of numbers that stratify 32 random bits: it lies in that part of all 32-bit numbers, and all of the numbers together
+/// come to each equally often.
+pub const fn stratified(bits: u32, part: u32, parts: u32) -> u32 {
+    // (part·2³² + bits) / parts in 32 bits.
+    let (whole, rest) = (
+        (0u32.wrapping_sub(parts) / parts).wrapping_add(1),
+        0u32.wrapping_sub(parts) % parts,
+    );
+    part.wrapping_mul(whole) + bits / parts + (part * rest + bits % parts) / parts
+}
+
+/// Bits that decide whether the `c`-th candidate is kept, of those for all; the first is kept whatever they are.
+pub const fn keep_bits(bits: u32, c: u32) -> u32 {
+    if c < 2 { bits } else { pcg(bits.wrapping_add(c)) }
 }
 
 /// Two numbers in [0, 1) of sample `index` under a [`key`].
@@ -165,12 +176,37 @@ mod tests {
             DIM_SHUTTER..DIM_SHUTTER + 1,
             DIM_LIGHT_PICK..DIM_LIGHT_PICK + MAX_RANDOM_LIGHTS,
             DIM_LIGHT_POINT..DIM_LIGHT_POINT + MAX_RANDOM_LIGHTS,
-            DIM_CANDIDATE_PICK..DIM_CANDIDATE_PICK + MAX_RANDOM_LIGHTS * MAX_CANDIDATES,
-            DIM_CANDIDATE_POINT..DIM_CANDIDATE_POINT + MAX_RANDOM_LIGHTS * MAX_CANDIDATES,
+            DIM_CANDIDATE_PICK..DIM_CANDIDATE_PICK + MAX_RANDOM_LIGHTS,
+            DIM_CANDIDATE_POINT..DIM_CANDIDATE_POINT + MAX_RANDOM_LIGHTS,
             DIM_EVERY_LIGHT..u32::MAX,
         ];
         for pair in ranges.windows(2) {
             assert!(pair[0].end <= pair[1].start);
+        }
+    }
+
+    /// Against the definition by direction numbers, v ← v ⊕ v/2.
+    #[test]
+    fn the_second_dimension_is_that_of_sobol() {
+        for index in (0..4096u32).chain((0..32).map(|b| 0x9e37_79b9u32.rotate_left(b))) {
+            let (mut v, mut x) = (1u32 << 31, 0);
+            for bit in 0..32 {
+                x ^= v * (index >> bit & 1);
+                v ^= v >> 1;
+            }
+            assert_eq!(sobol1_reversed(index), x.reverse_bits());
+        }
+    }
+
+    #[test]
+    fn strata_divide_all_numbers() {
+        for parts in 1..=MAX_CANDIDATES {
+            for part in 0..parts {
+                for bits in [0, 1, parts - 1, 12_345_678, u32::MAX - 1, u32::MAX] {
+                    let wanted = ((u64::from(part) << 32) + u64::from(bits)) / u64::from(parts);
+                    assert_eq!(u64::from(stratified(bits, part, parts)), wanted);
+                }
+            }
         }
     }
 
