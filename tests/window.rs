@@ -322,12 +322,17 @@ fn the_window_is_made_anew_again_and_again() {
         "rt_backend rayquery",
         "vid_restart",
     ];
-    let script: String = commands.iter().map(|c| format!("{c}\nwait 4\n")).collect();
+    // Each step says that it is over, and is waited for by itself: shaders are compiled five times on the way, and a
+    // processor that draws may take minutes for the whole.
+    let step = |(n, c): (usize, &&str)| format!("{c}\nwait 4\necho step {n} over\n");
+    let script: String = commands.iter().enumerate().map(step).collect();
     let arguments = [&["play", "showcase"][..], &SMALL, &["+exec", "all"]].concat();
     let mut desk = Desk::open("anew", &arguments, |home| {
-        std::fs::write(home.join("all.cfg"), script + "wait 30\necho at the end\nquit\n").expect("written");
+        std::fs::write(home.join("all.cfg"), script + "wait 30\nquit\n").expect("written");
     });
-    desk.wait("at the end");
+    for n in 0..commands.len() {
+        desk.wait(&format!("step {n} over"));
+    }
     assert_eq!(desk.ended(), Some(0));
     clean(&desk);
     let home = desk.home.path();
