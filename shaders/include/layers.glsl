@@ -97,7 +97,7 @@ Seen see(Path path) {
         Material material = FC.materials.at[FC.triangles.at[hit.triangle].material];
         out_.distance = travelled + hit.t;
         // Where it is in the map is looked up for what is shaded alone.
-        SurfaceHit s = shaded_hit(hit, direction, FC.cone * (1.0 + travelled / hit.t));
+        SurfaceHit s = shaded_hit(hit, direction, FC.cone, travelled);
         if (!drawn(material, s.front)) continue;
         bool layer = (material.flags & MATERIAL_LAYER) != 0;
         if (FC.white != 0) {

@@ -7,6 +7,8 @@ struct SurfaceHit {
     vec3 geometric_normal;
     vec3 shading_normal;
     vec2 uv;
+    // Level of detail of an image of one texel over those coordinates; -1e30 for full resolution.
+    float lod;
     vec3 albedo;
     // Radiance of stages that shine by themselves; of a sky, all that is seen.
     vec3 glow;
@@ -58,16 +60,26 @@ uint classify(vec3 position, vec3 normal) {
     return NONE;
 }
 
-float texture_lod(vec3 e1, vec3 e2, vec2 uv0, vec2 uv1, vec2 uv2, vec2 size, float width, float cosine) {
+const float FULL_RESOLUTION = -1e30;
+
+// Level of detail, for an image of one texel, whose texel is as wide as the ray's footprint.
+float texture_lod(vec3 e1, vec3 e2, vec2 uv0, vec2 uv1, vec2 uv2, float width, float cosine) {
     float world_area = length(cross(e1, e2));
-    vec2 t1 = (uv1 - uv0) * size;
-    vec2 t2 = (uv2 - uv0) * size;
+    vec2 t1 = uv1 - uv0;
+    vec2 t2 = uv2 - uv0;
     float texel_area = abs(t1.x * t2.y - t1.y * t2.x);
     float ratio = texel_area / max(world_area, 1.17549435e-38);
     return 0.5 * log2(max(ratio, 1.17549435e-38)) + log2(max(width / max(abs(cosine), 1e-3), 1.17549435e-38));
 }
 
-uint sky_box_side(vec3 d, out vec2 uv) {
+// The same for an image of more texels. Known to be 0 where lights are sampled: the compiler drops what blends levels.
+float lod_of(uint index, float lod) {
+    if (lod <= FULL_RESOLUTION) return 0.0;
+    TextureInfo info = FC.textures.at[index];
+    return lod + 0.5 * log2(float(info.width * info.height));
+}
+
+uint sky_box_side(vec3 d, out vec2 uv, out float across) {
     vec3 a = abs(d);
     uint side;
     vec2 st;
@@ -83,25 +95,35 @@ uint sky_box_side(vec3 d, out vec2 uv) {
         if (d.y > 0.0) { side = 2; st = vec2(d.x, -d.z); } else { side = 3; st = vec2(-d.x, -d.z); }
     }
     uv = st / m * 0.5 + 0.5;
+    across = m / length(d);
     return side;
 }
 
-vec3 sky_box(Material material, vec3 direction) {
+// Level of detail over directions, of the eye's rays.
+float sky_lod(float cone) {
+    return cone > 0.0 ? log2(cone) : FULL_RESOLUTION;
+}
+
+// `lod`: over directions.
+vec3 sky_box(Material material, vec3 direction, float lod) {
     vec2 uv;
-    uint side = sky_box_side(direction, uv);
-    return sample_texture(material.sky[side], uv, 0.0, true).rgb;
+    float across;
+    uint side = sky_box_side(direction, uv, across);
+    // The image, as wide as two, stands at distance 1: a cone is as wide as it is far, and stretched where it meets it aslant.
+    lod = lod_of(material.sky[side], lod - 1.0 - 2.0 * log2(across));
+    return sample_texture(material.sky[side], uv, lod, true).rgb;
 }
 
 // Radiance of a sky, as it lights: clouds stand for their mean.
 vec3 sky_radiance(Material material, vec3 direction) {
     bool box_alone = (material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES)) == MATERIAL_SKY_BOX;
-    return box_alone ? material.emission * sky_box(material, direction) : material.emission;
+    return box_alone ? material.emission * sky_box(material, direction, FULL_RESOLUTION) : material.emission;
 }
 
 // How far away clouds are where stages ask for a place, units.
 const float CLOUD_DISTANCE = 4096.0;
 
-Point point_on_texture(vec2 uv, vec3 position, vec3 to_viewer) {
+Point point_on_texture(vec2 uv, float lod, vec3 position, vec3 to_viewer) {
     Point p;
     p.uv = uv;
     p.lightmap_uv = uv;
@@ -110,31 +132,47 @@ Point point_on_texture(vec2 uv, vec3 position, vec3 to_viewer) {
     p.normal = to_viewer;
     p.to_viewer = to_viewer;
     p.distance = 0.0;
-    p.lod = -1e30;
+    p.lod = lod;
     return p;
 }
 
-// What a sky's stages look at: the cloud layer is a dome, below the horizon there is none.
-Point cloud_point(Material material, vec3 d) {
-    vec2 uv = cloud_coordinates(vec3(d.xy, max(d.z, 0.0)), material.cloud_height);
-    Point p = point_on_texture(uv, d * CLOUD_DISTANCE, -d);
+// Texture coordinates of clouds: the layer is a dome, below the horizon there is none.
+vec2 clouds_at(Material material, vec3 d) {
+    return cloud_coordinates(vec3(d.xy, max(d.z, 0.0)), material.cloud_height);
+}
+
+// What a sky's stages look at in a direction (unit).
+Point cloud_point(Material material, vec3 d, float cone) {
+    vec2 uv = clouds_at(material, d);
+    float lod = FULL_RESOLUTION;
+    if (cone > 0.0) {
+        // Along the horizon and across it; at the zenith, any two.
+        float flat_length = length(d.xy);
+        vec3 along = flat_length > 0.0 ? vec3(-d.y, d.x, 0.0) / flat_length : vec3(1.0, 0.0, 0.0);
+        vec3 up = cross(d, along);
+        float longest = max(length(clouds_at(material, normalize(d + along * cone)) - uv),
+                            length(clouds_at(material, normalize(d + up * cone)) - uv));
+        lod = log2(max(longest, LEAST));
+    }
+    Point p = point_on_texture(uv, lod, d * CLOUD_DISTANCE, -d);
     p.distance = CLOUD_DISTANCE;
     return p;
 }
 
 // Radiance of a sky as it is seen, with what its stages come to.
-vec3 sky_seen(Material material, vec3 direction, Shade clouds) {
+vec3 sky_seen(Material material, vec3 direction, float cone, Shade clouds) {
     bool has_box = (material.flags & MATERIAL_SKY_BOX) != 0;
     if (!has_box && (material.flags & MATERIAL_STAGES) == 0) {
         return FC.shown_emission == 0 ? material.shown : material.emission;
     }
-    vec3 picture = has_box ? sky_box(material, direction) : vec3(0.0);
+    vec3 picture = has_box ? sky_box(material, direction, sky_lod(cone)) : vec3(0.0);
     picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
     return picture * (FC.shown_emission == 0 ? material.shown : material.sky_scale);
 }
 
-// A hit as far as geometry and material go; `cluster` and `row` are left to `locate`.
-SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
+// A hit as far as geometry and material go; `cluster` and `row` are left to `locate`. `cone`: width of the eye ray's cone at
+// distance 1, 0 for full-resolution textures. `travelled`: way before this ray.
+SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone, float travelled) {
     SurfaceHit s;
     Instance instance = FC.instances.at[hit.instance];
     Triangle t = FC.triangles.at[hit.triangle];
@@ -170,8 +208,12 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
     Material material = FC.materials.at[t.material];
     bool sky = (material.flags & MATERIAL_SKY) != 0;
     float d = length(direction);
-    float width = cone * hit.t * d;
-    float cosine = dot(s.geometric_normal, direction) / d;
+    s.lod = FULL_RESOLUTION;
+    if (cone > 0.0) {
+        float width = cone * (1.0 + travelled / hit.t) * hit.t * d;
+        float cosine = dot(s.geometric_normal, direction) / d;
+        s.lod = texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, width, cosine);
+    }
     if ((material.flags & MATERIAL_STAGES) != 0) {
         Point p;
         p.uv = s.uv;
@@ -181,11 +223,11 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
         p.normal = s.shading_normal;
         p.to_viewer = -direction / d;
         p.distance = hit.t * d;
-        p.lod = cone > 0.0 ? texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(1.0), width, cosine) : -1e30;
-        if (sky) p = cloud_point(material, direction / d);
+        p.lod = s.lod;
+        if (sky) p = cloud_point(material, direction / d, cone);
         Shade shaded = shade(material, p, FC.glossy != 0 && !sky);
         if (sky) {
-            s.glow = sky_seen(material, direction, shaded);
+            s.glow = sky_seen(material, direction, cone, shaded);
             return s;
         }
         s.albedo = shaded.albedo;
@@ -195,14 +237,10 @@ SurfaceHit shaded_hit(Hit hit, vec3 direction, float cone) {
         return s;
     }
     if (sky) {
-        s.glow = sky_seen(material, direction, Shade(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0)));
+        s.glow = sky_seen(material, direction, cone, Shade(vec3(0.0), vec3(0.0), vec3(1.0), vec3(0.0)));
         return s;
     }
-    float lod = 0.0;
-    if (cone > 0.0) {
-        TextureInfo info = FC.textures.at[material.texture_index];
-        lod = texture_lod(b - a, c - a, va.uv, vb.uv, vc.uv, vec2(info.width, info.height), width, cosine);
-    }
+    float lod = lod_of(material.texture_index, s.lod);
     s.albedo = sample_texture(material.texture_index, s.uv, lod, (material.flags & MATERIAL_CLAMP) != 0).rgb;
     return s;
 }
@@ -226,14 +264,14 @@ bool drawn(Material material, bool front) {
     return (material.flags & (front ? MATERIAL_NO_FRONT : MATERIAL_BACK)) == (front ? 0 : MATERIAL_BACK);
 }
 
-// What a surface emits over its factor at a point of its texture.
-vec3 emission_picture(Material material, vec2 uv, vec3 position, vec3 direction) {
+// What a surface emits over its factor at a point of its texture. `lod`: of an image of one texel.
+vec3 emission_picture(Material material, vec2 uv, float lod, vec3 position, vec3 direction) {
     if ((material.flags & MATERIAL_MOVING_EMISSION) != 0) {
-        return shining(material, point_on_texture(uv, position, -direction));
+        return shining(material, point_on_texture(uv, lod, position, -direction));
     }
     if (material.emission_texture == NONE) return vec3(1.0);
     bool clamped = (material.flags & MATERIAL_CLAMP) != 0;
-    return sample_texture(material.emission_texture, uv, 0.0, clamped).rgb;
+    return sample_texture(material.emission_texture, uv, lod_of(material.emission_texture, lod), clamped).rgb;
 }
 
 // Radiance that a surface emits at a point of its texture towards -direction, from the side that emits: what lights are
@@ -241,7 +279,7 @@ vec3 emission_picture(Material material, vec2 uv, vec3 position, vec3 direction)
 vec3 emitted(Material material, vec2 uv, vec3 position, vec3 direction) {
     if ((material.flags & MATERIAL_SKY) != 0) return sky_radiance(material, direction);
     if (material.emission == vec3(0.0)) return vec3(0.0);
-    return material.emission * emission_picture(material, uv, position, direction);
+    return material.emission * emission_picture(material, uv, FULL_RESOLUTION, position, direction);
 }
 
 // What a light of a material is to the eye over what it lights with.
@@ -259,7 +297,7 @@ vec3 emission_seen(SurfaceHit s, vec3 direction) {
     vec3 factor = FC.shown_emission == 0 ? material.shown : material.emission;
     bool emits = s.front || (material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER)) != 0;
     if (!emits || factor == vec3(0.0)) return s.glow;
-    return s.glow + factor * emission_picture(material, s.uv, s.position, direction);
+    return s.glow + factor * emission_picture(material, s.uv, s.lod, s.position, direction);
 }
 
 #endif

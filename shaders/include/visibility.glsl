@@ -29,7 +29,7 @@ vec3 visible(vec3 origin, LightSample s) {
         }
         if (hit.triangle == NONE || (flags & MATERIAL_LAYER) == 0) break;
         if ((flags & MATERIAL_FILTER) != 0 && hit.t * len >= ON_RECEIVER) {
-            share *= min(shaded_hit(hit, direction, 0.0).through, vec3(1.0));
+            share *= min(shaded_hit(hit, direction, 0.0, 0.0).through, vec3(1.0));
         }
         if (share == vec3(0.0)) break;
         walk_on(hit);

@@ -126,7 +126,7 @@ impl<'a> Materials<'a> {
                     ((i % width) as f32 + 0.5) / width as f32,
                     ((i / width) as f32 + 0.5) / height as f32,
                 );
-                let (colour, alpha) = texel(&Point::on_texture(uv, Vec3::ZERO, Vec3::Z));
+                let (colour, alpha) = texel(&Point::on_texture(uv, f32::NEG_INFINITY, Vec3::ZERO, Vec3::Z));
                 let [r, g, b] = colour.to_array().map(byte);
                 [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
             })

@@ -125,8 +125,7 @@ pub fn see(
         after = Some(hit);
         let material = &scene.materials[scene.geometry.triangles[hit.triangle as usize].material as usize];
         let distance = travelled + hit.t as f32;
-        let wide = cone * (1.0 + travelled / hit.t as f32);
-        let mut surface = surface_at(scene, tracer, &hit, ray.direction, wide);
+        let mut surface = surface_at(scene, tracer, &hit, ray.direction, cone, travelled);
         if !drawn(material, surface.front) {
             continue;
         }

@@ -38,8 +38,8 @@ pub struct Point {
 }
 
 impl Point {
-    /// A point of which only texture and place are known.
-    pub fn on_texture(uv: Vec2, position: Vec3, to_viewer: Vec3) -> Self {
+    /// A point of which only texture, level of detail and place are known.
+    pub fn on_texture(uv: Vec2, lod: f32, position: Vec3, to_viewer: Vec3) -> Self {
         Self {
             uv,
             lightmap_uv: uv,
@@ -48,7 +48,7 @@ impl Point {
             normal: to_viewer,
             to_viewer,
             distance: 0.0,
-            lod: f32::NEG_INFINITY,
+            lod,
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::program::{Point, cloud_coordinates, shade, shining};
 use super::texture::{sample, uv_at};
 use super::trace::{Hit, Tracer, point_to_world};
+use crate::assets::image::Texture;
 use crate::render::settings::ShownEmission;
 use crate::scene::Scene;
 use crate::scene::blending::Shade;
@@ -27,6 +28,8 @@ pub struct SurfaceHit {
     /// Unit interpolated normal, same side.
     pub shading_normal: Vec3,
     pub uv: Vec2,
+    /// Level of detail of an image of one texel over those coordinates; of a sky, over directions. −∞ for full resolution.
+    pub lod: f32,
     /// Linear reflectance.
     pub albedo: Vec3,
     /// Radiance of stages that shine by themselves, luxel units.
@@ -61,6 +64,7 @@ impl SurfaceHit {
             geometric_normal: normal,
             shading_normal: normal,
             uv: Vec2::ZERO,
+            lod: f32::NEG_INFINITY,
             albedo: Vec3::ONE,
             glow: Vec3::ZERO,
             through: Vec3::ZERO,
@@ -103,14 +107,19 @@ pub fn classify(scene: &Scene, position: Vec3, normal: Vec3, fallback_row: u32) 
     (NONE, fallback_row)
 }
 
-/// Level of detail whose texel is as wide as the ray's footprint, for an image of `size` texels along its edges. `width`: of
-/// the ray's cone at the hit, units.
-fn texture_lod(corners: [Vec3; 3], uvs: [Vec2; 3], size: Vec2, width: f32, cosine: f32) -> f32 {
+/// Level of detail, for an image of one texel, whose texel is as wide as the ray's footprint. `width`: of the ray's cone at the
+/// hit, units.
+fn texture_lod(corners: [Vec3; 3], uvs: [Vec2; 3], width: f32, cosine: f32) -> f32 {
     let world_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
-    let (e1, e2) = ((uvs[1] - uvs[0]) * size, (uvs[2] - uvs[0]) * size);
+    let (e1, e2) = (uvs[1] - uvs[0], uvs[2] - uvs[0]);
     let texel_area = (e1.x * e2.y - e1.y * e2.x).abs();
     let ratio = texel_area / world_area.max(f32::MIN_POSITIVE);
     0.5 * ratio.max(f32::MIN_POSITIVE).log2() + (width / cosine.abs().max(1e-3)).max(f32::MIN_POSITIVE).log2()
+}
+
+/// The same for an image of more texels.
+fn lod_of(texture: &Texture, lod: f32) -> f32 {
+    lod + 0.5 * ((texture.width * texture.height) as f32).log2()
 }
 
 /// A hit as far as geometry goes.
@@ -152,28 +161,30 @@ fn colour(code: u32) -> Vec4 {
     Vec4::from_array(code.to_le_bytes().map(|c| f32::from(c) / 255.0))
 }
 
-fn stage_point(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Point {
+/// Level of detail of the surface's coordinates. `cone` as for [`shade_at`].
+fn footprint(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> f32 {
+    if cone <= 0.0 {
+        return f32::NEG_INFINITY;
+    }
+    let vertices = scene.geometry.triangles[hit.triangle as usize].vertices;
+    let uvs = vertices.map(|v| Vec2::from(scene.geometry.attributes[v as usize].uv));
+    let length = direction.length();
+    texture_lod(
+        tracer.corners(scene, hit.triangle),
+        uvs,
+        cone * hit.t as f32 * length,
+        place.geometric.dot(direction) / length,
+    )
+}
+
+fn stage_point(scene: &Scene, place: &Place, hit: &Hit, direction: Vec3, lod: f32) -> Point {
     let triangle = scene.geometry.triangles[hit.triangle as usize];
     let attributes = triangle.vertices.map(|v| scene.geometry.attributes[v as usize]);
     let [b1, b2] = hit.barycentrics.map(|b| b as f32);
     let b0 = 1.0 - b1 - b2;
-    let uvs = attributes.map(|a| Vec2::from(a.uv));
     let page = attributes.map(|a| Vec2::from(a.lightmap_uv));
     let colours = attributes.map(|a| colour(a.color));
     let length = direction.length();
-    let distance = hit.t as f32 * length;
-    let lod = if cone > 0.0 {
-        let cosine = place.geometric.dot(direction) / length;
-        texture_lod(
-            tracer.corners(scene, hit.triangle),
-            uvs,
-            Vec2::ONE,
-            cone * distance,
-            cosine,
-        )
-    } else {
-        f32::NEG_INFINITY
-    };
     Point {
         uv: uv_at(scene, hit.triangle, [b1, b2]),
         lightmap_uv: page[0] * b0 + page[1] * b1 + page[2] * b2,
@@ -181,24 +192,18 @@ fn stage_point(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, directi
         position: place.position,
         normal: place.shading,
         to_viewer: -direction / length,
-        distance,
+        distance: hit.t as f32 * length,
         lod,
     }
 }
 
 /// What stages look at in a hit, textures at full resolution.
 pub fn point_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3) -> Point {
-    stage_point(
-        scene,
-        tracer,
-        &place(scene, tracer, hit, direction),
-        hit,
-        direction,
-        0.0,
-    )
+    let place = place(scene, tracer, hit, direction);
+    stage_point(scene, &place, hit, direction, f32::NEG_INFINITY)
 }
 
-fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, cone: f32) -> Shade {
+fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction: Vec3, lod: f32) -> Shade {
     let triangle = scene.geometry.triangles[hit.triangle as usize];
     let material = &scene.materials[triangle.material as usize];
     if material.flags & MATERIAL_SKY != 0 {
@@ -210,25 +215,11 @@ fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction:
         };
     }
     if material.flags & MATERIAL_STAGES != 0 {
-        let point = stage_point(scene, tracer, place, hit, direction, cone);
+        let point = stage_point(scene, place, hit, direction, lod);
         return shade(scene, material, &point, tracer.clock, tracer.glossy);
     }
     let texture = &scene.textures[material.texture as usize];
-    let lod = if cone > 0.0 {
-        let uvs = triangle
-            .vertices
-            .map(|v| Vec2::from(scene.geometry.attributes[v as usize].uv));
-        let length = direction.length();
-        texture_lod(
-            tracer.corners(scene, hit.triangle),
-            uvs,
-            Vec2::new(texture.width as f32, texture.height as f32),
-            cone * hit.t as f32 * length,
-            place.geometric.dot(direction) / length,
-        )
-    } else {
-        0.0
-    };
+    let lod = lod_of(texture, lod);
     let uv = uv_at(scene, hit.triangle, hit.barycentrics.map(|b| b as f32));
     Shade {
         albedo: sample(texture, uv, lod, material.flags & MATERIAL_CLAMP != 0).xyz(),
@@ -238,29 +229,33 @@ fn shade_of(scene: &Scene, tracer: &Tracer, place: &Place, hit: &Hit, direction:
     }
 }
 
-/// What a surface does with light at a hit. `cone` as for [`surface_at`].
-pub fn shade_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, cone: f32) -> Shade {
-    shade_of(
-        scene,
-        tracer,
-        &place(scene, tracer, hit, direction),
-        hit,
-        direction,
-        cone,
-    )
+/// What a surface does with light at a hit, textures at full resolution.
+pub fn shade_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3) -> Shade {
+    let place = place(scene, tracer, hit, direction);
+    shade_of(scene, tracer, &place, hit, direction, f32::NEG_INFINITY)
 }
 
-/// Evaluates the surface at a hit. `cone`: width of the ray's cone at distance 1, 0 for full-resolution textures.
-pub fn surface_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, cone: f32) -> SurfaceHit {
+/// Evaluates the surface at a hit. `cone`: width of the eye ray's cone at distance 1, 0 for full-resolution textures.
+/// `travelled`: way before this ray, units.
+pub fn surface_at(scene: &Scene, tracer: &Tracer, hit: &Hit, direction: Vec3, cone: f32, travelled: f32) -> SurfaceHit {
     let place = place(scene, tracer, hit, direction);
     let triangle = scene.geometry.triangles[hit.triangle as usize];
-    let shade = shade_of(scene, tracer, &place, hit, direction, cone);
+    let sky = scene.materials[triangle.material as usize].flags & MATERIAL_SKY != 0;
+    let lod = if sky {
+        // Infinitely far away: the way before is nothing.
+        cone.log2()
+    } else {
+        let wide = cone * (1.0 + travelled / hit.t as f32);
+        footprint(scene, tracer, &place, hit, direction, wide)
+    };
+    let shade = shade_of(scene, tracer, &place, hit, direction, lod);
     let (cluster, row) = classify(scene, place.position, place.geometric, triangle.fallback_row);
     SurfaceHit {
         position: place.position,
         geometric_normal: place.geometric,
         shading_normal: place.shading,
         uv: uv_at(scene, hit.triangle, hit.barycentrics.map(|b| b as f32)),
+        lod,
         albedo: shade.albedo,
         glow: shade.glow,
         through: shade.through,
@@ -283,8 +278,9 @@ pub fn drawn(material: &Material, front: bool) -> bool {
     }
 }
 
-/// Image and texture coordinates of a sky box in a direction; images in the order of `Material::sky`.
-fn sky_box_lookup(d: Vec3) -> (usize, Vec2) {
+/// Image of a sky box in a direction, in the order of `Material::sky`, texture coordinates, and what part of the direction's length
+/// goes across the image.
+fn sky_box_lookup(d: Vec3) -> (usize, Vec2, f32) {
     let a = d.abs();
     // Seen from inside, with z up; the game's right is +x, back +y, left −x, front −y, and the top image continues
     // the right one.
@@ -305,26 +301,50 @@ fn sky_box_lookup(d: Vec3) -> (usize, Vec2) {
     } else {
         (3, -d.x, -d.z, a.y)
     };
-    (side, Vec2::new(s, t) / m * 0.5 + 0.5)
+    (side, Vec2::new(s, t) / m * 0.5 + 0.5, m / d.length())
 }
 
-fn sky_box(scene: &Scene, material: &Material, direction: Vec3) -> Vec3 {
-    let (side, uv) = sky_box_lookup(direction);
-    sample(&scene.textures[material.sky[side] as usize], uv, 0.0, true).xyz()
+/// `lod`: over directions.
+fn sky_box(scene: &Scene, material: &Material, direction: Vec3, lod: f32) -> Vec3 {
+    let (side, uv, across) = sky_box_lookup(direction);
+    let texture = &scene.textures[material.sky[side] as usize];
+    // The image, as wide as two, stands at distance 1: a cone is as wide as it is far, and stretched where it meets it aslant.
+    let lod = lod_of(texture, lod - 1.0 - 2.0 * across.log2());
+    sample(texture, uv, lod, true).xyz()
+}
+
+/// Texture coordinates of clouds in a direction (unit), and their level of detail. The cloud layer is a dome; below the horizon
+/// there is none. `lod`: over directions.
+fn clouds_lookup(d: Vec3, height: f32, lod: f32) -> (Vec2, f32) {
+    let at = |d: Vec3| cloud_coordinates(Vec3::new(d.x, d.y, d.z.max(0.0)), height);
+    let uv = at(d);
+    let cone = lod.exp2();
+    if cone <= 0.0 {
+        return (uv, f32::NEG_INFINITY);
+    }
+    // Along the horizon and across it; at the zenith, any two.
+    let along = Vec3::new(-d.y, d.x, 0.0).normalize_or(Vec3::X);
+    let up = d.cross(along);
+    let longest = [along, up]
+        .map(|side| (at((d + side * cone).normalize()) - uv).length())
+        .into_iter()
+        .fold(f32::MIN_POSITIVE, f32::max);
+    (uv, longest.log2())
 }
 
 /// Radiance of a sky material in a direction, as it lights: clouds stand for their mean.
 fn sky_radiance(scene: &Scene, material: &Material, direction: Vec3) -> Vec3 {
     let scale = Vec3::from(material.emission);
     if material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES) == MATERIAL_SKY_BOX {
-        scale * sky_box(scene, material, direction)
+        scale * sky_box(scene, material, direction, f32::NEG_INFINITY)
     } else {
         scale
     }
 }
 
-/// Radiance of a sky material in a direction, as it is seen.
-fn sky_seen(scene: &Scene, material: &Material, direction: Vec3, clock: Clock, shown: ShownEmission) -> Vec3 {
+/// Radiance of a sky in a direction, as it is seen.
+fn sky_seen(scene: &Scene, surface: &SurfaceHit, direction: Vec3, shown: ShownEmission) -> Vec3 {
+    let material = &scene.materials[surface.material as usize];
     if material.flags & (MATERIAL_SKY_BOX | MATERIAL_STAGES) == 0 {
         return match shown {
             ShownEmission::Game => material.shown,
@@ -333,19 +353,18 @@ fn sky_seen(scene: &Scene, material: &Material, direction: Vec3, clock: Clock, s
         .into();
     }
     let mut picture = if material.flags & MATERIAL_SKY_BOX != 0 {
-        sky_box(scene, material, direction)
+        sky_box(scene, material, direction, surface.lod)
     } else {
         Vec3::ZERO
     };
     if material.flags & MATERIAL_STAGES != 0 {
         let d = direction.normalize();
-        // The cloud layer is a dome; below the horizon there is none.
-        let uv = cloud_coordinates(Vec3::new(d.x, d.y, d.z.max(0.0)), material.cloud_height);
+        let (uv, lod) = clouds_lookup(d, material.cloud_height, surface.lod);
         let point = Point {
             distance: CLOUD_DISTANCE,
-            ..Point::on_texture(uv, d * CLOUD_DISTANCE, -d)
+            ..Point::on_texture(uv, lod, d * CLOUD_DISTANCE, -d)
         };
-        let clouds = shade(scene, material, &point, clock, false);
+        let clouds = shade(scene, material, &point, surface.clock, false);
         picture = clouds.albedo + clouds.glow / UNLIT + clouds.through * picture;
     }
     let scale = match shown {
@@ -355,24 +374,25 @@ fn sky_seen(scene: &Scene, material: &Material, direction: Vec3, clock: Clock, s
     picture * Vec3::from(scale)
 }
 
-/// What a surface emits over its factor at a point of its texture. `position`: world.
+/// What a surface emits over its factor at a point of its texture. `lod`: of an image of one texel. `position`: world.
 fn emission_picture(
     scene: &Scene,
     material: &Material,
     uv: Vec2,
+    lod: f32,
     position: Vec3,
     direction: Vec3,
     clock: Clock,
 ) -> Vec3 {
     if material.flags & MATERIAL_MOVING_EMISSION != 0 {
-        let point = Point::on_texture(uv, position, -direction);
+        let point = Point::on_texture(uv, lod, position, -direction);
         return shining(scene, material, &point, clock);
     }
     if material.emission_texture == NONE {
         return Vec3::ONE;
     }
     let texture = &scene.textures[material.emission_texture as usize];
-    sample(texture, uv, 0.0, material.flags & MATERIAL_CLAMP != 0).xyz()
+    sample(texture, uv, lod_of(texture, lod), material.flags & MATERIAL_CLAMP != 0).xyz()
 }
 
 /// Radiance that a surface emits at a point of its texture towards `-direction`, from the side that emits: what lights are
@@ -385,15 +405,14 @@ pub fn emitted(scene: &Scene, material: &Material, uv: Vec2, position: Vec3, dir
     if factor == Vec3::ZERO {
         return factor;
     }
-    factor * emission_picture(scene, material, uv, position, direction, clock)
+    factor * emission_picture(scene, material, uv, f32::NEG_INFINITY, position, direction, clock)
 }
 
 /// Radiance that a ray along `direction` receives from a surface it hits, but for the light that the surface reflects.
 pub fn emission_seen(scene: &Scene, surface: &SurfaceHit, direction: Vec3, shown: ShownEmission) -> Vec3 {
     let material = &scene.materials[surface.material as usize];
-    let clock = surface.clock;
     if material.flags & MATERIAL_SKY != 0 {
-        return sky_seen(scene, material, direction, clock, shown);
+        return sky_seen(scene, surface, direction, shown);
     }
     let emits = surface.front || material.flags & (MATERIAL_TWO_SIDED_EMISSION | MATERIAL_LAYER) != 0;
     let factor = Vec3::from(match shown {
@@ -403,5 +422,6 @@ pub fn emission_seen(scene: &Scene, surface: &SurfaceHit, direction: Vec3, shown
     if !emits || factor == Vec3::ZERO {
         return surface.glow;
     }
-    surface.glow + factor * emission_picture(scene, material, surface.uv, surface.position, direction, clock)
+    let (uv, lod, position) = (surface.uv, surface.lod, surface.position);
+    surface.glow + factor * emission_picture(scene, material, uv, lod, position, direction, surface.clock)
 }

@@ -36,7 +36,7 @@ fn filtered(scene: &Scene, tracer: &Tracer, origin: Vec3, direction: Vec3, t_max
             break;
         }
         if material.flags & MATERIAL_FILTER != 0 && hit.t as f32 * direction.length() >= ON_RECEIVER {
-            share *= shade_at(scene, tracer, &hit, direction, 0.0).through.min(Vec3::ONE);
+            share *= shade_at(scene, tracer, &hit, direction).through.min(Vec3::ONE);
         }
         after = Some(hit);
     }

@@ -69,7 +69,7 @@ pub fn explain(cpu: &CpuRenderer, camera: &Camera, size: (u32, u32), settings: &
     else {
         return Cause::Unexplained;
     };
-    let at = surface_at(scene, &cpu.tracer, &hit, ray.direction, 0.0);
+    let at = surface_at(scene, &cpu.tracer, &hit, ray.direction, 0.0, 0.0);
     let (lists, row) = light_row(scene, settings, at.row);
     let listed: std::collections::HashSet<u32> = lists.lights(row).collect();
     let origin = offset_point(at.position, at.geometric_normal);
