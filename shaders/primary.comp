@@ -3,12 +3,13 @@
 #extension GL_GOOGLE_include_directive : require
 #define TRACE_LAYERS
 #define NOTES_INTERFACE
+#define WHOLE_PIXELS
 #include "prelude.glsl"
 #include "random.glsl"
 #include "texture.glsl"
 #include "trace.glsl"
-#include "surface.glsl"
 #include "camera.glsl"
+#include "surface.glsl"
 #include "gbuffer.glsl"
 #include "guide.glsl"
 #include "layers.glsl"
@@ -16,6 +17,9 @@
 #include "secondary_tiles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
+// Distance of what is seen where nothing is met, units.
+const float FAR_AWAY = 1e9;
 
 // Where a point was in the frame before.
 vec3 old_position_of(Instance i, Hit hit) {
@@ -62,6 +66,9 @@ bool shoot(uvec2 pixel) {
     ivec2 p = ivec2(pixel);
     vec3 origin, direction;
     camera_ray(pixel, sample_index, origin, direction);
+    own_pixel = pixel;
+    // Where frames are blended; what stands still is the mean of single samples, as it is where they are accumulated.
+    whole_pixel = FC.jitter.x >= 0.0 && FC.antialiasing != 0 && FC.still == 0 && FC.aperture <= 0.0;
     Seen seen = see(Path(origin, direction, vec3(1.0), 0.0, 0, pixel.x + (pixel.y << 16), -1.0, 0, 0));
     bool branches = branch_count != 0;
     if (FC.branches_off != 0) {
@@ -69,6 +76,9 @@ bool shoot(uvec2 pixel) {
         imageStore(secondary_guide, p, interface_guide);
     }
     Hit hit = seen.hit;
+    // A miss is black.
+    bool sky = hit.triangle == NONE || (FC.materials.at[seen.surface.material].flags & MATERIAL_SKY) != 0;
+    bool complete = sky && whole_pixel && !met_sun && !branches && seen.layers == vec3(0.0);
     imageStore(gbuffer_view, p, vec4(direction, 0.0));
     imageStore(image_layers, p, vec4(seen.layers, 0.0));
     imageStore(image_share, p, vec4(seen.share, 0.0));
@@ -78,7 +88,7 @@ bool shoot(uvec2 pixel) {
         imageStore(gbuffer_surface, p, uvec4(0, 0, NONE, NONE));
         imageStore(gbuffer_object, p, uvec4(NONE, NONE, 0, NONE));
         imageStore(image_emission, p, vec4(0.0));
-        imageStore(gbuffer_motion, p, vec4(motion_of_direction(direction), 0.0, 0.0));
+        imageStore(gbuffer_motion, p, vec4(motion_of_direction(direction), complete ? 0.0 : FAR_AWAY, 0.0));
         imageStore(guide, p, uvec4(0));
         return branches;
     }
@@ -89,7 +99,6 @@ bool shoot(uvec2 pixel) {
     imageStore(gbuffer_object, p, uvec4(hit.triangle, hit.instance, packUnorm2x16(hit.barycentrics), s.cluster));
     imageStore(image_emission, p, vec4(seen.emission, 0.0));
     // A sky's picture is infinitely far away, wherever the surface that shows it is.
-    bool sky = (FC.materials.at[s.material].flags & MATERIAL_SKY) != 0;
     // Seen in a mirror, a surface moves as its image behind the mirror does.
     vec3 place = mapped(seen.place, s.position, 1.0);
     vec3 normal = mapped(seen.place, s.shading_normal, 0.0);
@@ -101,7 +110,7 @@ bool shoot(uvec2 pixel) {
         old_position = mapped(seen.place, old_position_of(instance, hit), 1.0);
         motion = motion_between(place - FC.eye, old_position - FC.old_eye);
     }
-    imageStore(gbuffer_motion, p, vec4(motion, seen.distance, dot(old_position - FC.old_eye, FC.old_forward)));
+    imageStore(gbuffer_motion, p, vec4(motion, complete ? 0.0 : seen.distance, dot(old_position - FC.old_eye, FC.old_forward)));
     float depth = s.albedo == vec3(0.0) ? 0.0 : dot(place - FC.eye, FC.forward);
     imageStore(guide, p, pack_guide(depth, to_view(normal), s.material, hit.instance));
     return branches;

@@ -16,6 +16,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const float LEAST_WEIGHT = 0.1;
 const float LEAST_BETWEEN = 0.5;
 const float LEAST_STILL = 1.0 / 256.0;
+// Frames that a sky counts for which is the mean over its pixel.
+const float SKY_FRAMES = 16.0;
 // Farther away than so many times as far as a neighbour, and units, a pixel lies behind an edge.
 const vec2 EDGE_DEPTHS = vec2(1.1, 1.0);
 
@@ -76,7 +78,7 @@ vec4 history_at(vec2 place) {
     return vec4(max(sum / weights, vec3(0.0)), frames);
 }
 
-// What the work group and the pixels around it show, compressed, and how far away; 0 where nothing is met.
+// What the work group and the pixels around it show, compressed, and how far away; 0 where a sky is the mean over its pixel.
 const int EDGE = 10;
 shared vec4 around[EDGE * EDGE];
 
@@ -108,6 +110,7 @@ vec4 blended(ivec2 p, vec3 own, float e) {
             }
         }
     }
+    if (nearest == 1e30) return vec4(own, SKY_FRAMES);
     // On the surface itself every pixel moves by its own: to take its neighbour's would shift it a little in each frame.
     float own_depth = around[centre].w;
     if (own_depth > 0.0 && own_depth < nearest * EDGE_DEPTHS.x + EDGE_DEPTHS.y) nearest_at = ivec2(0);

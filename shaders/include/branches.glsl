@@ -179,7 +179,13 @@ vec3 emission_met(float pdf, Path path, SurfaceHit s, Hit hit, vec3 direction) {
     vec3 seen = emission_seen(s, direction);
     // Light samples of a lobe have found the suns.
     bool sunny = FC.draw_sun != 0 && pdf <= 0.0 && (FC.materials.at[s.material].flags & MATERIAL_SKY) != 0;
-    if (sunny) seen += suns_seen(direction);
+    if (sunny) {
+        vec3 suns = suns_seen(direction);
+#ifdef WHOLE_PIXELS
+        if (suns != vec3(0.0)) met_sun = true;
+#endif
+        seen += suns;
+    }
 #ifdef FOLLOWS_BRANCHES
     uint number = pdf >= 0.0 ? FC.triangle_lights.at[hit.triangle] : NONE;
     if (number != NONE) {

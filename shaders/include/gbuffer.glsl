@@ -7,7 +7,7 @@
 // | surface | shading normal and geometric normal (octahedral, 2 x 16 bits), material, light row |
 // | object | global triangle, instance, barycentrics (2 x 16 bits), PVS cluster |
 // | view | direction of the ray |
-// | motion | previous − current image position, pixels, y down; distance along the ray, 0 for none; view depth in the frame before |
+// | motion | previous − current image position, pixels, y down; distance along the ray, 0 where a sky is the mean over its pixel; view depth in the frame before |
 // | emission | radiance emitted towards the eye |
 // | share | share of the surface's light that comes through the layers before it |
 // | layers | radiance of those layers |

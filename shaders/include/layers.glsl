@@ -238,6 +238,9 @@ Seen see(Path path) {
             pdf = -1.0;
             fog = NO_FOG;
             begin_walk();
+#ifdef WHOLE_PIXELS
+            whole_pixel = false;
+#endif
         }
     }
     if (out_.hit.triangle != NONE) locate(out_.surface);
