@@ -76,9 +76,10 @@ bool shoot(uvec2 pixel) {
         imageStore(secondary_guide, p, interface_guide);
     }
     Hit hit = seen.hit;
-    // A miss is black.
+    // A miss is black. Where a layer was passed by chance, others show it: their mean is left to history.
     bool sky = hit.triangle == NONE || (FC.materials.at[seen.surface.material].flags & MATERIAL_SKY) != 0;
-    bool complete = sky && whole_pixel && !met_sun && !branches && seen.layers == vec3(0.0);
+    bool complete = sky && whole_pixel && !met_sun && !branches && seen.layers == vec3(0.0)
+        && seen.share == vec3(1.0);
     imageStore(gbuffer_view, p, vec4(direction, 0.0));
     imageStore(image_layers, p, vec4(seen.layers, 0.0));
     imageStore(image_share, p, vec4(seen.share, 0.0));

@@ -1,7 +1,9 @@
 #version 460
 // Temporal anti-aliasing: the composed radiance, one place in each pixel per frame, blended with that of frames before.
 //
-// Linear light, weighted by 1/(1 + Y·exposure) so that bright edges do not win (Karis 2014); history is fetched with a cubic
+// Linear light, weighted by 1/(1 + Y·exposure) so that bright edges do not win (Karis 2014). All pixels of a frame are looked at in
+// the same place of theirs, which is not their centre: where the view moves, what each shows at its centre is interpolated from
+// its surroundings, or textures would tremble with the place. History is fetched with a cubic
 // filter along the motion of the surface, at edges of the nearest one around, and held to the mean ± γ standard deviations of the
 // pixel's surroundings in YCoCg (Salvi 2016). While view and scene stand still nothing is held back, and the result is the
 // mean over the pixel.
@@ -91,10 +93,23 @@ void read_around(ivec2 corner, float e) {
     }
 }
 
+// Standard deviation of the weights by which a frame is interpolated, pixels.
+const float INTERPOLATION = 0.35;
+
+// Weights of a pixel and its neighbours before and after it along one side of the image, whose places are off their centres.
+vec3 weights_around(float off) {
+    vec3 d = vec3(-1.0, 0.0, 1.0) + off;
+    vec3 w = exp(d * d * (-0.5 / (INTERPOLATION * INTERPOLATION)));
+    return w / (w.x + w.y + w.z);
+}
+
 vec4 blended(ivec2 p, vec3 own, float e) {
     int centre = (int(gl_LocalInvocationID.y) + 1) * EDGE + int(gl_LocalInvocationID.x) + 1;
     vec3 mean = vec3(0.0);
     vec3 square = vec3(0.0);
+    vec3 interpolated = vec3(0.0);
+    vec3 wx = weights_around(FC.jitter.x - 0.5);
+    vec3 wy = weights_around(FC.jitter.y - 0.5);
     float brightest = 0.0;
     float nearest = 1e30;
     ivec2 nearest_at = ivec2(0);
@@ -103,6 +118,7 @@ vec4 blended(ivec2 p, vec3 own, float e) {
             vec4 c = around[centre + y * EDGE + x];
             mean += c.rgb / 9.0;
             square += c.rgb * c.rgb / 9.0;
+            interpolated += c.rgb * (wx[x + 1] * wy[y + 1]);
             brightest = max(brightest, c.x);
             if (c.w > 0.0 && c.w < nearest) {
                 nearest = c.w;
@@ -111,6 +127,8 @@ vec4 blended(ivec2 p, vec3 own, float e) {
         }
     }
     if (nearest == 1e30) return vec4(own, SKY_FRAMES);
+    // The mean of compressed radiance is that of radiance with the weights above.
+    own = max(expand(interpolated, e), vec3(0.0));
     // On the surface itself every pixel moves by its own: to take its neighbour's would shift it a little in each frame.
     float own_depth = around[centre].w;
     if (own_depth > 0.0 && own_depth < nearest * EDGE_DEPTHS.x + EDGE_DEPTHS.y) nearest_at = ivec2(0);
