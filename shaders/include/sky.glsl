@@ -46,19 +46,6 @@ vec3 sky_radiance(Material material, vec3 direction) {
 // How far away clouds are where stages ask for a place, units.
 const float CLOUD_DISTANCE = 4096.0;
 
-Point point_on_texture(vec2 uv, float lod, vec3 position, vec3 to_viewer) {
-    Point p;
-    p.uv = uv;
-    p.lightmap_uv = uv;
-    p.colour = vec4(1.0);
-    p.position = position;
-    p.normal = to_viewer;
-    p.to_viewer = to_viewer;
-    p.distance = 0.0;
-    p.lod = lod;
-    return p;
-}
-
 // Texture coordinates of clouds: the layer is a dome, below the horizon there is none.
 vec2 clouds_at(Material material, vec3 d) {
     return cloud_coordinates(vec3(d.xy, max(d.z, 0.0)), material.cloud_height);

@@ -79,6 +79,20 @@ float lod_of(uint index, float lod) {
     return lod + 0.5 * log2(float(info.width * info.height));
 }
 
+// A point of which only texture, level of detail and place are known.
+Point point_on_texture(vec2 uv, float lod, vec3 position, vec3 to_viewer) {
+    Point p;
+    p.uv = uv;
+    p.lightmap_uv = uv;
+    p.colour = vec4(1.0);
+    p.position = position;
+    p.normal = to_viewer;
+    p.to_viewer = to_viewer;
+    p.distance = 0.0;
+    p.lod = lod;
+    return p;
+}
+
 #include "sky.glsl"
 
 // A hit as far as geometry and material go; `cluster` and `row` are left to `locate`. `cone`: width of the eye ray's cone at
