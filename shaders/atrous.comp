@@ -40,6 +40,9 @@ const float LOG2_E = 1.4426950408889634;
 // Squared deviation of a pixel's luminance, in units of its weight's exponent, over its variance.
 const float SQUARED = SIGMA_LUMINANCE * SIGMA_LUMINANCE / (LOG2_E * LOG2_E);
 
+// Depth of a pixel that shows nothing: whatever is weighed against it weighs nothing.
+const float EMPTY = 1e-30;
+
 // A pixel; in shared memory as depth, normal (halves), deviation (the upper half of a float), luminance; red and blue.
 struct Texel {
     float depth;
@@ -52,18 +55,18 @@ struct Texel {
 
 shared bool group_branches;
 shared uvec4 near_a[READ];
-shared uvec2 near_b[READ];
+shared vec2 near_b[READ];
 
 void keep(int at, Texel t) {
     uint last = (packHalf2x16(vec2(t.normal.z, 0.0)) & 0xffffu) | (floatBitsToUint(t.deviation) & 0xffff0000u);
     near_a[at] = uvec4(floatBitsToUint(t.depth), packHalf2x16(t.normal.xy), last, floatBitsToUint(t.lrb.x));
-    near_b[at] = floatBitsToUint(t.lrb.yz);
+    near_b[at] = t.lrb.yz;
 }
 
 Texel kept(int at) {
     uvec4 a = near_a[at];
     vec3 normal = vec3(unpackHalf2x16(a.y), unpackHalf2x16(a.z).x);
-    vec3 lrb = vec3(uintBitsToFloat(a.w), uintBitsToFloat(near_b[at]));
+    vec3 lrb = vec3(uintBitsToFloat(a.w), near_b[at]);
     return Texel(uintBitsToFloat(a.x), normal, uintBitsToFloat(a.z & 0xffff0000u), lrb);
 }
 
@@ -121,6 +124,11 @@ Texel unpacked(uvec4 guide_words, uvec4 colour_words) {
     return Texel(g.depth, g.normal, SQUARED * colour.a + 1e-8 * l * l + 1e-12, vec3(l, colour.r, colour.b));
 }
 
+// Units at depth 1 from a pixel to the one a step to the right and down.
+vec2 step_aside() {
+    return vec2(2.0 * FC.half_width, -2.0 * FC.half_height) / vec2(FC.size) * float(STEP);
+}
+
 // Most pixels that a thread reads: those of level 4.
 const int MOST_READ = (WIDTH + 32) * (ROWS + 2) / 128;
 
@@ -141,7 +149,7 @@ void read_all(ivec2 corner) {
         int i = lane + k * 128;
         ivec2 p = place_of(corner, i);
         Texel t = unpacked(guides[k], colours[k]);
-        if (p != clamp(p, ivec2(0), last)) t.depth = 0.0;
+        if (t.depth <= 0.0 || p != clamp(p, ivec2(0), last)) t.depth = EMPTY;
         if (i < READ) keep(i, t);
     }
 }
@@ -151,59 +159,61 @@ struct Centre {
     Texel own;
     // The ray through it at depth 1, without its third component, which is 1.
     vec2 ray;
-    // The normal's part along the ray, and what it is at a step to the right and down.
+    // The normal's part along the ray, and how that changes a step to the right and down.
     float facing;
     vec2 aside;
-    vec3 change;
+    // Exponent by which weights fall, per unit off a plane.
+    float fall;
+    vec3 sum;
     float weights;
     float variance;
 };
 
-// Units at depth 1 from a pixel to the one a step to the right and down.
-vec2 step_aside() {
-    return vec2(2.0 * FC.half_width, -2.0 * FC.half_height) / vec2(FC.size) * float(STEP);
+// Of a surface at a depth.
+float fall_at(float depth) {
+    return LOG2_E / SIGMA_PLANE / step_aside().x / depth;
 }
 
 Centre centre_of(Texel own, ivec2 p) {
     vec2 ray = view_point(vec2(p) + jitter_now(), 1.0).xy;
-    return Centre(own, ray, dot(own.normal.xy, ray) + own.normal.z, own.normal.xy * step_aside(), vec3(0.0), 0.0, 0.0);
+    float facing = dot(own.normal.xy, ray) + own.normal.z;
+    return Centre(own, ray, facing, own.normal.xy * step_aside(), fall_at(own.depth), vec3(0.0), 0.0, 0.0);
 }
 
-// How much of the difference to the pixel so many steps away is taken: the same seen from there.
-float weight_of(Centre c, Texel other, int x, int y) {
+// Weight of the pixel so many steps away: the same seen from there. `fall`: that at its depth.
+float weight_of(Centre c, Texel other, float fall, int x, int y) {
     // Each pixel's distance off the other's plane.
     vec2 aside = step_aside();
     float deeper = other.depth - c.own.depth;
-    float between = c.facing * deeper + (float(x) * c.aside.x + float(y) * c.aside.y) * other.depth;
+    float ahead = c.facing * deeper + (float(x) * c.aside.x + float(y) * c.aside.y) * other.depth;
     float facing = dot(other.normal.xy, c.ray) + other.normal.z;
     float back = facing * deeper + (float(x) * aside.x * other.normal.x + float(y) * aside.y * other.normal.y) * other.depth;
-    float off = max(abs(between), abs(back));
-    float nearer = min(c.own.depth, other.depth);
-    float unlike = abs(c.own.lrb.x - other.lrb.x) * inversesqrt(c.own.deviation + other.deviation)
-                 + off * (LOG2_E / SIGMA_PLANE / aside.x) / nearer
-                 + LOG2_E * NORMAL_FALL * max(1.0 - dot(c.own.normal, other.normal), 0.0);
-    float kernel = x == 0 || y == 0 ? 0.125 : 0.0625;
+    // The kernel, 2^-3 and 2^-4, is a part of the exponent.
+    float exponent = LOG2_E * NORMAL_FALL * dot(c.own.normal, other.normal)
+                   - (LOG2_E * NORMAL_FALL + (x == 0 || y == 0 ? 3.0 : 4.0));
+    exponent -= max(abs(ahead), abs(back)) * max(c.fall, fall);
+    exponent -= abs(c.own.lrb.x - other.lrb.x) * inversesqrt(c.own.deviation + other.deviation);
     // One level of the secondary channel always runs: it brings the result to its place.
-    if (IS_SECONDARY && FC.secondary_levels == 0) kernel = 0.0;
-    return nearer > 0.0 ? kernel * exp2(-unlike) : 0.0;
+    if (IS_SECONDARY && FC.secondary_levels == 0) return 0.0;
+    return exp2(exponent);
 }
 
 void take(inout Centre c, Texel other, float weight) {
-    c.change += weight * (other.lrb - c.own.lrb);
+    c.sum += weight * other.lrb;
     c.weights += weight;
     c.variance += weight * weight * other.deviation;
 }
 
 void finish(Centre c, ivec2 p) {
     if (any(greaterThanEqual(p, ivec2(FC.size)))) return;
-    if (c.own.depth <= 0.0) {
+    if (c.own.depth <= EMPTY) {
         if (IS_SECONDARY) return;
         store(p, vec3(0.0), 0.0);
         if (LEVEL == 0) store_history(p, vec3(0.0));
         return;
     }
     float rest = 1.0 - c.weights;
-    vec3 filtered = colour_of(c.own.lrb + c.change);
+    vec3 filtered = colour_of(rest * c.own.lrb + c.sum);
     store(p, filtered, (rest * rest * c.own.deviation + c.variance) / SQUARED);
     if (LEVEL == 0) {
         // The next frame starts from this, less and less so the more frames there are: filtering the same history again and
@@ -227,15 +237,16 @@ void main() {
     int at = (row + 1) * READ_WIDTH + column + STEP;
     Centre upper = centre_of(kept(at), p);
     Centre lower = centre_of(kept(at + READ_WIDTH), q);
-    float shared_ = weight_of(upper, lower.own, 0, 1);
+    float shared_ = weight_of(upper, lower.own, lower.fall, 0, 1);
     take(upper, lower.own, shared_);
     take(lower, upper.own, shared_);
     [[unroll]] for (int y = -1; y <= 2; y++) {
         [[unroll]] for (int x = -1; x <= 1; x++) {
             if (x == 0 && (y == 0 || y == 1)) continue;
             Texel other = kept(at + y * READ_WIDTH + x * STEP);
-            if (y <= 1) take(upper, other, weight_of(upper, other, x, y));
-            if (y >= 0) take(lower, other, weight_of(lower, other, x, y - 1));
+            float fall = fall_at(other.depth);
+            if (y <= 1) take(upper, other, weight_of(upper, other, fall, x, y));
+            if (y >= 0) take(lower, other, weight_of(lower, other, fall, x, y - 1));
         }
     }
     finish(upper, p);

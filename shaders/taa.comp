@@ -18,6 +18,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const float LEAST_WEIGHT = 0.1;
 const float LEAST_BETWEEN = 0.5;
 const float LEAST_STILL = 1.0 / 256.0;
+// Most that half precision keeps, of radiance and of frames.
+const float MOST_KEPT = 6e4;
+const float MOST_FRAMES = 2048.0;
 // Frames that a sky counts for which is the mean over its pixel.
 const float SKY_FRAMES = 16.0;
 // Farther away than so many times as far as a neighbour, and units, a pixel lies behind an edge.
@@ -66,18 +69,18 @@ vec4 history_at(vec2 place) {
     vec4 wy = weights_of(part.y);
     ivec2 last = ivec2(FC.size) - 1;
     vec3 sum = vec3(0.0);
-    float weights = 0.0;
     float frames = 1e9;
     [[unroll]] for (int y = 0; y < 4; y++) {
         [[unroll]] for (int x = 0; x < 4; x++) {
             if ((x == 0 || x == 3) && (y == 0 || y == 3)) continue;
             vec4 h = imageLoad(taa_before, clamp(first + ivec2(x - 1, y - 1), ivec2(0), last));
             sum += h.rgb * (wx[x] * wy[y]);
-            weights += wx[x] * wy[y];
             if (x > 0 && x < 3 && y > 0 && y < 3) frames = min(frames, h.a);
         }
     }
-    return vec4(max(sum / weights, vec3(0.0)), frames);
+    // All sixteen weights sum to 1.
+    float corners = (wx.x + wx.w) * (wy.x + wy.w);
+    return vec4(max(sum / (1.0 - corners), vec3(0.0)), frames);
 }
 
 // What the work group and the pixels around it show, compressed, and how far away; 0 where a sky is the mean over its pixel.
@@ -96,11 +99,15 @@ void read_around(ivec2 corner, float e) {
 // Standard deviation of the weights by which a frame is interpolated, pixels.
 const float INTERPOLATION = 0.35;
 
-// Weights of a pixel and its neighbours before and after it along one side of the image, whose places are off their centres.
-vec3 weights_around(float off) {
-    vec3 d = vec3(-1.0, 0.0, 1.0) + off;
-    vec3 w = exp(d * d * (-0.5 / (INTERPOLATION * INTERPOLATION)));
-    return w / (w.x + w.y + w.z);
+// Weights of a pixel and its neighbours before and after it, along the image's sides: the same for all pixels.
+shared vec3 interpolation[2];
+
+void make_interpolation() {
+    int side = int(gl_LocalInvocationIndex);
+    if (side > 1) return;
+    vec3 off = vec3(-1.0, 0.0, 1.0) + (FC.jitter[side] - 0.5);
+    vec3 w = exp(off * off * (-0.5 / (INTERPOLATION * INTERPOLATION)));
+    interpolation[side] = w / (w.x + w.y + w.z);
 }
 
 vec4 blended(ivec2 p, vec3 own, float e) {
@@ -108,8 +115,8 @@ vec4 blended(ivec2 p, vec3 own, float e) {
     vec3 mean = vec3(0.0);
     vec3 square = vec3(0.0);
     vec3 interpolated = vec3(0.0);
-    vec3 wx = weights_around(FC.jitter.x - 0.5);
-    vec3 wy = weights_around(FC.jitter.y - 0.5);
+    vec3 wx = interpolation[0];
+    vec3 wy = interpolation[1];
     float brightest = 0.0;
     float nearest = 1e30;
     ivec2 nearest_at = ivec2(0);
@@ -159,6 +166,7 @@ void main() {
     float e = exposure();
     if (blends) {
         read_around(ivec2(gl_WorkGroupID.xy) * 8, e);
+        make_interpolation();
         barrier();
     }
     if (!inside) return;
@@ -168,10 +176,12 @@ void main() {
     if (blends) {
         result = blended(p, own, e);
     } else if (FC.history != 0) {
-        vec4 before = imageLoad(taa_before, p);
+        vec4 before = FC.still == 1 ? imageLoad(taa_before, p) : imageLoad(taa_mean, p);
         float frames = before.a + 1.0;
         // Weights grow with the frame's number: early ones were denoised from fewer samples.
         result = vec4(mix(before.rgb, own, max(2.0 / (frames + 1.0), LEAST_STILL)), frames);
     }
-    imageStore(taa_now, p, result);
+    // Small parts of new frames would be lost to rounding.
+    if (FC.still != 0) imageStore(taa_mean, p, result);
+    imageStore(taa_now, p, vec4(min(result.rgb, vec3(MOST_KEPT)), min(result.a, MOST_FRAMES)));
 }

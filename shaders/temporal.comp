@@ -45,36 +45,34 @@ vec3 sample_at(ivec2 p) {
     return imageLoad(channel_sample, p).rgb;
 }
 
-vec4 old_moments_at(ivec2 p) {
-    vec4 m = imageLoad(channel_moments_before, p);
-    if (IS_SECONDARY) m.y *= m.y;
-    return m;
-}
-
-void store_moments(ivec2 p, vec4 m) {
-    // Half precision, which the secondary channel has, ends at 65504.
-    if (IS_SECONDARY) m.xy = min(vec2(m.x, sqrt(m.y)), vec2(6e4));
-    imageStore(channel_moments_now, p, m);
-}
-
 void store_result(ivec2 p, uvec4 result) {
     imageStore(filter_a, p, result);
     // Where the filter has levels, the first one's result is what the next frame starts from.
     if (!IS_SECONDARY && FC.filter_levels == 0) imageStore(channel_now, p, result);
 }
 
-// `at` and `normal`: the surface along the axes of the view before.
-bool same_surface(ivec2 q, uint id, vec3 at, vec3 normal) {
-    if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(FC.size)))) return false;
-    Guide other = unpack_guide(imageLoad(channel_old_guide, q));
-    if (other.depth <= 0.0 || other.id != id || dot(other.normal, normal) < LEAST_COSINE) return false;
-    vec3 there = old_view_point(vec2(q) + jitter_before(), other.depth);
-    return abs(dot(there - at, normal)) < OFF_PLANE.x * at.z + OFF_PLANE.y;
+// A pixel's surface along the axes of the view before.
+struct Before {
+    uint id;
+    vec3 normal;
+    // Distance of its plane from the eye, along the normal, and the most that it may be off.
+    float plane;
+    float slack;
+};
+
+bool same_surface(ivec2 q, uvec4 guide_words, Before b) {
+    Guide other = unpack_guide(guide_words);
+    vec3 ray = old_view_point(vec2(q) + jitter_before(), 1.0);
+    bool near = abs(other.depth * dot(ray, b.normal) - b.plane) < b.slack;
+    return near && other.depth > 0.0 && other.id == b.id && dot(other.normal, b.normal) >= LEAST_COSINE;
 }
 
-void add(inout Past past, inout float weights, ivec2 q, float weight) {
-    vec4 moments = old_moments_at(q);
-    uvec4 colour = imageLoad(channel_before, q);
+bool inside(ivec2 q) {
+    return all(greaterThanEqual(q, ivec2(0))) && all(lessThan(q, ivec2(FC.size)));
+}
+
+void add(inout Past past, inout float weights, vec4 moments, uvec4 colour, float weight) {
+    moments = moments_of(moments);
     past.irradiance += unpack_colour(colour).rgb * weight;
     past.share += moments.w * weight;
     past.moments += moments.xy * weight;
@@ -115,23 +113,38 @@ Past past_of(ivec2 p, Guide g) {
         if (abs(motion.x) > float(FC.size.x) || abs(motion.y) > float(FC.size.y)) return past;
     }
     vec3 normal = to_old_view(FC.right * g.normal.x + FC.up * g.normal.y + FC.forward * g.normal.z);
+    Before b = Before(g.id, normal, dot(at, normal), OFF_PLANE.x * at.z + OFF_PLANE.y);
     Past sum = Past(vec3(0.0), 0.0, vec2(0.0), 0.0);
     float weights = 0.0;
     vec2 place = vec2(p) + motion;
     ivec2 first = ivec2(floor(place));
     vec2 part = place - vec2(first);
-    for (int i = 0; i < 4; i++) {
+    // All four are asked for at once, then what passes.
+    uvec4 guides[4];
+    float shares[4];
+    [[unroll]] for (int i = 0; i < 4; i++) {
         ivec2 step_ = ivec2(i & 1, i >> 1);
         vec2 near = mix(1.0 - part, part, vec2(step_));
-        float weight = near.x * near.y;
-        if (weight > 1e-3 && same_surface(first + step_, g.id, at, normal)) add(sum, weights, first + step_, weight);
+        shares[i] = near.x * near.y;
+        if (shares[i] <= 1e-3 || !inside(first + step_)) shares[i] = 0.0;
+        guides[i] = shares[i] > 0.0 ? imageLoad(channel_old_guide, first + step_) : uvec4(0);
     }
+    vec4 moments[4];
+    uvec4 colours[4];
+    [[unroll]] for (int i = 0; i < 4; i++) {
+        ivec2 q = first + ivec2(i & 1, i >> 1);
+        if (!same_surface(q, guides[i], b)) shares[i] = 0.0;
+        moments[i] = shares[i] > 0.0 ? imageLoad(channel_moments_before, q) : vec4(0.0);
+        colours[i] = shares[i] > 0.0 ? imageLoad(channel_before, q) : uvec4(0);
+    }
+    [[unroll]] for (int i = 0; i < 4; i++) add(sum, weights, moments[i], colours[i], shares[i]);
     if (weights < 0.05) {
         // None of the four nearest shows the surface: its edge may have run between them.
         ivec2 centre = ivec2(round(place));
-        for (int i = 0; i < 9; i++) {
+        [[dont_unroll]] for (int i = 0; i < 9; i++) {
             ivec2 q = centre + ivec2(i % 3 - 1, i / 3 - 1);
-            if (same_surface(q, g.id, at, normal)) add(sum, weights, q, 0.1);
+            if (!inside(q) || !same_surface(q, imageLoad(channel_old_guide, q), b)) continue;
+            add(sum, weights, imageLoad(channel_moments_before, q), imageLoad(channel_before, q), 0.1);
         }
     }
     if (weights <= 0.0) return past;
@@ -143,12 +156,14 @@ vec3 surroundings(ivec2 p, Guide g, int reach, bool itself) {
     vec3 at = view_point(vec2(p) + jitter_now(), g.depth);
     vec3 normal = g.normal;
     vec3 sum = vec3(0.0);
-    // Of what branches off every other pixel is enough: it is asked for wherever the scene changes.
-    const int EACH = IS_SECONDARY ? 2 : 1;
-    [[dont_unroll]] for (int y = -reach; y <= reach; y += EACH) {
-        [[dont_unroll]] for (int x = -reach; x <= reach; x += EACH) {
+    if (itself) {
+        float l = luminance(sample_at(p));
+        sum = vec3(l, l * l, 1.0);
+    }
+    // Every other pixel is enough, of so wide a square.
+    [[dont_unroll]] for (int y = -reach; y <= reach; y += 2) {
+        [[dont_unroll]] for (int x = -reach; x <= reach; x += 2) {
             ivec2 q = p + ivec2(x, y);
-            if (!itself && q == p) continue;
             if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(FC.size)))) continue;
             Guide other = guide_at(q);
             if (other.depth <= 0.0 || dot(other.normal, g.normal) < LEAST_COSINE) continue;
@@ -184,7 +199,7 @@ void main() {
         // Nothing of the other channel is read where its guide is empty.
         if (IS_SECONDARY) return;
         store_result(p, uvec4(0));
-        store_moments(p, vec4(0.0, 0.0, 0.0, 1.0));
+        imageStore(channel_moments_now, p, kept_moments(vec2(0.0), 0.0, 1.0));
         return;
     }
     vec3 sampled = sample_at(p);
@@ -213,7 +228,7 @@ void main() {
         variance = max(variance, max(mean.y - mean.x * mean.x, 0.0));
     }
     store_result(p, pack_colour(irradiance, variance * share));
-    store_moments(p, vec4(moments, frames, share));
+    imageStore(channel_moments_now, p, kept_moments(moments, frames, share));
     // A pixel of each 16 x 16 tells for all of them how long their history is.
     if (!IS_SECONDARY && ((p.x | p.y) & 15) == 0) {
         atomicAdd(FC.counters.at[4], uint(min(frames, 4096.0)));

@@ -50,7 +50,7 @@ vec3 intermediate(ivec2 p) {
         case 12: return vec3(moments.z > 0.0 ? mix(max(1.0 / moments.z, FC.least_alpha), 1.0, gradient_at(p)) : 0.0);
         case 13: return vec3(moments.z / (moments.z + 20.0));
         case 14: return displayed(vec3(sqrt(filtered.a)));
-        case 15: return displayed(vec3(moments.x, sqrt(moments.y), 0.0));
+        case 15: return displayed(vec3(moments.xy, 0.0));
         case 16: return vec3(gradient_at(p));
         case 17: return vec3(imageLoad(gbuffer_motion, p).xy / 32.0 + 0.5, 0.5);
         case 23: return displayed(FC.branches_off != 0 ? imageLoad(image_secondary, p).rgb : vec3(0.0));

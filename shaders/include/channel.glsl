@@ -22,4 +22,18 @@ const bool IS_SECONDARY = false;
 #define channel_moments_before moments_before
 #endif
 
+// Moments are kept in half precision, which ends at 65504 and of whose squares little would be left of a difference: first and
+// second moment of the luminance, frames and share, of and to what is kept.
+const float MOST_KEPT = 6e4;
+const float MOST_FRAMES = 2048.0;
+
+vec4 moments_of(vec4 kept) {
+    return vec4(kept.x, kept.x * kept.x + kept.y * kept.y, kept.zw);
+}
+
+vec4 kept_moments(vec2 moments, float frames, float share) {
+    float deviation = sqrt(max(moments.y - moments.x * moments.x, 0.0));
+    return vec4(min(vec2(moments.x, deviation), vec2(MOST_KEPT)), min(frames, MOST_FRAMES), share);
+}
+
 #endif

@@ -21,10 +21,11 @@
 // | gradient_a, gradient_b | one texel per stratum of 3 x 3 pixels: |Δ| of the luminance; the larger luminance |
 // | guide | view depth (0: nothing that reflects), shading normal (2 x 12 bits), 8 bits of material and instance |
 // | irradiance | history: irradiance/π (packed.glsl) |
-// | moments | history: first and second moment of the luminance; frames; share of one sample's variance that their mean has |
+// | moments | history: mean and standard deviation of the luminance; frames; share of one sample's variance that their mean has (channel.glsl) |
 // | taa | history: radiance; frames |
+// | taa_mean | the same, in full precision, while view and scene stand still |
 // | secondary_guide | as guide, of the first surface that something branches off at |
-// | secondary_radiance, secondary_moments | history of secondary, as irradiance and moments; of the second moment the square root |
+// | secondary_radiance, secondary_moments | history of secondary, as irradiance and moments |
 #ifndef GBUFFER_GLSL
 #define GBUFFER_GLSL
 
@@ -50,20 +51,21 @@ layout(set = 1, binding = 18, rgba32f) uniform image2D image_share;
 layout(set = 1, binding = 19, rgba32f) uniform image2D image_layers;
 layout(set = 1, binding = 20, rgba32f) uniform image2D image_mean_layers;
 layout(set = 1, binding = 21, rgba32f) uniform image2D image_secondary;
-layout(set = 1, binding = 22, rgba16ui) uniform uimage2D guide;
-layout(set = 1, binding = 23, rgba16ui) uniform uimage2D old_guide;
-layout(set = 1, binding = 24, rgba16ui) uniform uimage2D irradiance_now;
-layout(set = 1, binding = 25, rgba16ui) uniform uimage2D irradiance_before;
-layout(set = 1, binding = 26, rgba32f) uniform image2D moments_now;
-layout(set = 1, binding = 27, rgba32f) uniform image2D moments_before;
-layout(set = 1, binding = 28, rgba32f) uniform image2D taa_now;
-layout(set = 1, binding = 29, rgba32f) uniform image2D taa_before;
-layout(set = 1, binding = 30, rgba16ui) uniform uimage2D secondary_guide;
-layout(set = 1, binding = 31, rgba16ui) uniform uimage2D old_secondary_guide;
-layout(set = 1, binding = 32, rgba16ui) uniform uimage2D secondary_radiance_now;
-layout(set = 1, binding = 33, rgba16ui) uniform uimage2D secondary_radiance_before;
-layout(set = 1, binding = 34, rgba16f) uniform image2D secondary_moments_now;
-layout(set = 1, binding = 35, rgba16f) uniform image2D secondary_moments_before;
+layout(set = 1, binding = 22, rgba32f) uniform image2D taa_mean;
+layout(set = 1, binding = 23, rgba16ui) uniform uimage2D guide;
+layout(set = 1, binding = 24, rgba16ui) uniform uimage2D old_guide;
+layout(set = 1, binding = 25, rgba16ui) uniform uimage2D irradiance_now;
+layout(set = 1, binding = 26, rgba16ui) uniform uimage2D irradiance_before;
+layout(set = 1, binding = 27, rgba16f) uniform image2D moments_now;
+layout(set = 1, binding = 28, rgba16f) uniform image2D moments_before;
+layout(set = 1, binding = 29, rgba16f) uniform image2D taa_now;
+layout(set = 1, binding = 30, rgba16f) uniform image2D taa_before;
+layout(set = 1, binding = 31, rgba16ui) uniform uimage2D secondary_guide;
+layout(set = 1, binding = 32, rgba16ui) uniform uimage2D old_secondary_guide;
+layout(set = 1, binding = 33, rgba16ui) uniform uimage2D secondary_radiance_now;
+layout(set = 1, binding = 34, rgba16ui) uniform uimage2D secondary_radiance_before;
+layout(set = 1, binding = 35, rgba16f) uniform image2D secondary_moments_now;
+layout(set = 1, binding = 36, rgba16f) uniform image2D secondary_moments_before;
 
 // Octahedral map of a unit vector to 2 x 16 bits (Meyer et al. 2010).
 uint pack_normal(vec3 n) {

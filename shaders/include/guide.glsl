@@ -11,14 +11,27 @@ struct Guide {
     uint id;
 };
 
+// Normals are kept by Lambert's azimuthal projection, whose centre faces the eye: unit vectors come of it without a square root of
+// their length, and the one direction that it has no place for looks away from the eye.
 const float NORMAL_STEPS = 4095.0;
+
+// 12 bits each of the projection, which is within 2 of its centre.
+uvec2 project_normal(vec3 n) {
+    vec2 e = n.xy * sqrt(2.0 / max(1.0 - n.z, 1e-6));
+    return uvec2(round(clamp(e * 0.25 + 0.5, 0.0, 1.0) * NORMAL_STEPS));
+}
+
+vec3 projected_normal(uvec2 bits) {
+    // Numbers between 1 and 2 by their bits: conversions are slow.
+    vec2 steps = uintBitsToFloat(0x3f800000u | (bits << 11)) - 1.0;
+    vec2 e = steps * (4.0 * 4096.0 / NORMAL_STEPS) - 2.0;
+    float f = dot(e, e);
+    return vec3(e * sqrt(max(1.0 - 0.25 * f, 0.0)), 0.5 * f - 1.0);
+}
 
 // `normal` along the view's axes.
 uvec4 pack_guide(float depth, vec3 normal, uint material, uint instance) {
-    normal /= abs(normal.x) + abs(normal.y) + abs(normal.z);
-    vec2 side = vec2(normal.x >= 0.0 ? 1.0 : -1.0, normal.y >= 0.0 ? 1.0 : -1.0);
-    vec2 o = normal.z >= 0.0 ? normal.xy : (1.0 - abs(normal.yx)) * side;
-    uvec2 n = uvec2(round(clamp(o * 0.5 + 0.5, 0.0, 1.0) * NORMAL_STEPS));
+    uvec2 n = project_normal(normal);
     uint id = ((material * 0x9e3779b1u) ^ (instance * 0x85ebca77u)) >> 24;
     uint low = floatBitsToUint(depth);
     uint high = n.x | (n.y << 12) | (id << 24);
@@ -27,11 +40,8 @@ uvec4 pack_guide(float depth, vec3 normal, uint material, uint instance) {
 
 Guide unpack_guide(uvec4 words) {
     uint high = words.z | (words.w << 16);
-    vec2 o = vec2(high & 0xfffu, (high >> 12) & 0xfffu) / NORMAL_STEPS * 2.0 - 1.0;
-    vec3 n = vec3(o, 1.0 - abs(o.x) - abs(o.y));
-    vec2 side = vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
-    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * side;
-    return Guide(uintBitsToFloat(words.x | (words.y << 16)), normalize(n), high >> 24);
+    vec3 normal = projected_normal(uvec2(high & 0xfffu, (high >> 12) & 0xfffu));
+    return Guide(uintBitsToFloat(words.x | (words.y << 16)), normal, high >> 24);
 }
 
 // A direction along right, up and forward of this frame's view, and of the one before.

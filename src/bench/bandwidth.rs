@@ -8,17 +8,18 @@ use std::sync::Arc;
 const COPIED: u64 = 512 << 20;
 const COPIES: u32 = 12;
 
-/// Fewest bytes per pixel that a pass must move, each image that it needs read or written once: guide, colours, moments, radiance
-/// and motion take 8, 8, 16, 16 and 16. `moving`: the view moves. None for passes that are not the denoiser's or TAA.
+/// Fewest bytes per pixel that a pass must move, each image that it needs read or written once: guide, colours, moments
+/// and what anti-aliasing fetches take 8, radiance, its mean and motion 16. `moving`: the view moves. None for passes that are not the denoiser's or TAA.
 pub fn fewest_bytes(pass: &str, moving: bool) -> Option<u32> {
     Some(match pass {
         // Sample, guide and history of guide, irradiance and moments; result and moments.
-        "temporal" => 16 + 8 + 8 + 8 + 16 + 8 + 16 + if moving { 16 } else { 0 },
+        "temporal" => 16 + 8 + 8 + 8 + 8 + 8 + 8,
         // Guide, colour, moments; result and what the next frame starts from.
-        "atrous0" => 8 + 8 + 16 + 8 + 8,
+        "atrous0" => 8 + 8 + 8 + 8 + 8,
         "atrous1" | "atrous2" | "atrous3" | "atrous4" => 8 + 8 + 8,
-        // Radiance, history, result.
-        "taa" => 16 + 16 + 16 + if moving { 16 } else { 0 },
+        // Radiance, motion, history, result; of a still view radiance, mean before and after, result.
+        "taa" if moving => 16 + 16 + 8 + 8,
+        "taa" => 16 + 16 + 16 + 8,
         _ => return None,
     })
 }

@@ -121,7 +121,7 @@ pub struct FrameConstants {
     pub taa: u32,
     /// The view's histories are those of the frame before.
     pub history: u32,
-    /// The view is the same as the frame before's.
+    /// 0: view or scene have changed since the frame before, 1: they have not, 2: nor had they before it.
     pub still: u32,
     /// Least weight of a new frame in the denoiser's history.
     pub least_alpha: f32,

@@ -5,7 +5,7 @@ use ash::vk;
 use std::sync::Arc;
 
 /// Name and format of every image, in the order of their bindings in set 1.
-const IMAGES: [(&str, vk::Format); 22] = [
+const IMAGES: [(&str, vk::Format); 23] = [
     ("albedo", vk::Format::R32G32B32A32_SFLOAT),
     ("position", vk::Format::R32G32B32A32_SFLOAT),
     ("surface", vk::Format::R32G32B32A32_UINT),
@@ -28,6 +28,7 @@ const IMAGES: [(&str, vk::Format); 22] = [
     ("layers", vk::Format::R32G32B32A32_SFLOAT),
     ("mean layers", vk::Format::R32G32B32A32_SFLOAT),
     ("secondary", vk::Format::R32G32B32A32_SFLOAT),
+    ("taa mean", vk::Format::R32G32B32A32_SFLOAT),
 ];
 
 /// Name and format of every image that the next frame reads too: this frame's and the one before's stand side by side in set
@@ -35,8 +36,8 @@ const IMAGES: [(&str, vk::Format); 22] = [
 const HISTORIES: [(&str, vk::Format); 7] = [
     ("guide", vk::Format::R16G16B16A16_UINT),
     ("irradiance", vk::Format::R16G16B16A16_UINT),
-    ("moments", vk::Format::R32G32B32A32_SFLOAT),
-    ("taa", vk::Format::R32G32B32A32_SFLOAT),
+    ("moments", vk::Format::R16G16B16A16_SFLOAT),
+    ("taa", vk::Format::R16G16B16A16_SFLOAT),
     ("secondary guide", vk::Format::R16G16B16A16_UINT),
     ("secondary radiance", vk::Format::R16G16B16A16_UINT),
     ("secondary moments", vk::Format::R16G16B16A16_SFLOAT),
@@ -110,7 +111,8 @@ accessors!(
     share = 18,
     layers = 19,
     mean_layers = 20,
-    secondary = 21;
+    secondary = 21,
+    taa_mean = 22;
     guide = 0,
     irradiance = 1,
     moments = 2,

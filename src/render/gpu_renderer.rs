@@ -9,6 +9,8 @@ use crate::gpu::{Commands, GpuError, Image};
 use crate::reference::direct::RayCounts;
 use crate::scene::camera::{Camera, Shot};
 use crate::scene::records::NONE;
+use ash::vk;
+use half::f16;
 use std::ops::Range;
 
 /// Makes accumulated images and AOVs of a scene on the GPU.
@@ -18,11 +20,12 @@ pub struct GpuRenderer<'a> {
 }
 
 fn floats(image: &Image) -> Result<Vec<[f32; 4]>, GpuError> {
-    Ok(image
-        .read_back(0)?
-        .chunks_exact(16)
-        .map(bytemuck::pod_read_unaligned)
-        .collect())
+    let bytes = image.read_back(0)?;
+    if image.format() == vk::Format::R16G16B16A16_SFLOAT {
+        let halves = |pixel: &[u8]| bytemuck::pod_read_unaligned::<[u16; 4]>(pixel).map(|h| f16::from_bits(h).to_f32());
+        return Ok(bytes.chunks_exact(8).map(halves).collect());
+    }
+    Ok(bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect())
 }
 
 fn words(image: &Image) -> Result<Vec<[u32; 4]>, GpuError> {

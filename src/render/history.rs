@@ -135,7 +135,11 @@ impl FrameHistory {
             old_jitter: if good { view.jitter } else { jitter },
             history: u32::from(good),
             changed: u32::from(good && changed && input.denoises() && input.settings.gradients),
-            still: u32::from(self.unchanged >= SETTLED),
+            still: match (self.unchanged >= SETTLED, view.still) {
+                (false, _) => 0,
+                (true, 0) => 1,
+                (true, _) => 2,
+            },
             ..constants
         };
         self.before = Some((complete, key));

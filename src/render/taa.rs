@@ -26,6 +26,7 @@ impl Taa {
         let mut uses: Vec<_> = read.map(|i| Use::image(i, Access::ComputeRead)).into();
         uses.push(Use::buffer(exposure, Access::ComputeRead));
         uses.push(Use::image(g.taa().now(g.parity), Access::ComputeWrite));
+        uses.push(Use::image(g.taa_mean(), Access::ComputeReadWrite));
         self.0.record_image(r, &uses)
     }
 }
