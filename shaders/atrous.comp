@@ -154,6 +154,15 @@ void read_all(ivec2 corner) {
     }
 }
 
+// From this level on variances are means of many pixels' and known by themselves: see `fall_of`.
+const int VARIANCE_KNOWN = 2;
+
+// Exponents by which a pixel's weights fall: per unit off a plane, and its factor of that per unit of luminance.
+struct Fall {
+    float plane;
+    float luminance;
+};
+
 // The pixel that is filtered.
 struct Centre {
     Texel own;
@@ -162,26 +171,28 @@ struct Centre {
     // The normal's part along the ray, and how that changes a step to the right and down.
     float facing;
     vec2 aside;
-    // Exponent by which weights fall, per unit off a plane.
-    float fall;
+    Fall fall;
     vec3 sum;
     float weights;
     float variance;
 };
 
-// Of a surface at a depth.
-float fall_at(float depth) {
-    return LOG2_E / SIGMA_PLANE / step_aside().x / depth;
+// Differences of luminance are held against the sum of two variances while a pixel's own hardly says anything: light that few
+// samples find makes one in some pixels only. Later against their geometric mean, or a spot of light, as a lamp makes on
+// the wall that it hangs on, would be spread over the dark around it, which is known well.
+Fall fall_of(Texel t) {
+    float luminance = LEVEL >= VARIANCE_KNOWN ? inversesqrt(sqrt(2.0 * t.deviation)) : 0.0;
+    return Fall(LOG2_E / SIGMA_PLANE / step_aside().x / t.depth, luminance);
 }
 
 Centre centre_of(Texel own, ivec2 p) {
     vec2 ray = view_point(vec2(p) + jitter_now(), 1.0).xy;
     float facing = dot(own.normal.xy, ray) + own.normal.z;
-    return Centre(own, ray, facing, own.normal.xy * step_aside(), fall_at(own.depth), vec3(0.0), 0.0, 0.0);
+    return Centre(own, ray, facing, own.normal.xy * step_aside(), fall_of(own), vec3(0.0), 0.0, 0.0);
 }
 
-// Weight of the pixel so many steps away: the same seen from there. `fall`: that at its depth.
-float weight_of(Centre c, Texel other, float fall, int x, int y) {
+// Weight of the pixel so many steps away: the same seen from there. `fall`: its own.
+float weight_of(Centre c, Texel other, Fall fall, int x, int y) {
     // Each pixel's distance off the other's plane.
     vec2 aside = step_aside();
     float deeper = other.depth - c.own.depth;
@@ -191,8 +202,9 @@ float weight_of(Centre c, Texel other, float fall, int x, int y) {
     // The kernel, 2^-3 and 2^-4, is a part of the exponent.
     float exponent = LOG2_E * NORMAL_FALL * dot(c.own.normal, other.normal)
                    - (LOG2_E * NORMAL_FALL + (x == 0 || y == 0 ? 3.0 : 4.0));
-    exponent -= max(abs(ahead), abs(back)) * max(c.fall, fall);
-    exponent -= abs(c.own.lrb.x - other.lrb.x) * inversesqrt(c.own.deviation + other.deviation);
+    exponent -= max(abs(ahead), abs(back)) * max(c.fall.plane, fall.plane);
+    float unlike = LEVEL >= VARIANCE_KNOWN ? c.fall.luminance * fall.luminance : inversesqrt(c.own.deviation + other.deviation);
+    exponent -= abs(c.own.lrb.x - other.lrb.x) * unlike;
     // One level of the secondary channel always runs: it brings the result to its place.
     if (IS_SECONDARY && FC.secondary_levels == 0) return 0.0;
     return exp2(exponent);
@@ -244,7 +256,7 @@ void main() {
         [[unroll]] for (int x = -1; x <= 1; x++) {
             if (x == 0 && (y == 0 || y == 1)) continue;
             Texel other = kept(at + y * READ_WIDTH + x * STEP);
-            float fall = fall_at(other.depth);
+            Fall fall = fall_of(other);
             if (y <= 1) take(upper, other, weight_of(upper, other, fall, x, y));
             if (y >= 0) take(lower, other, weight_of(lower, other, fall, x, y - 1));
         }
