@@ -11,6 +11,7 @@
 #include "prelude.glsl"
 #include "gbuffer.glsl"
 #include "gradient.glsl"
+#include "half_precision.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -18,9 +19,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const float LEAST_WEIGHT = 0.1;
 const float LEAST_BETWEEN = 0.5;
 const float LEAST_STILL = 1.0 / 256.0;
-// Most that half precision keeps, of radiance and of frames.
-const float MOST_KEPT = 6e4;
-const float MOST_FRAMES = 2048.0;
 // Frames that a sky counts for which is the mean over its pixel.
 const float SKY_FRAMES = 16.0;
 // Farther away than so many times as far as a neighbour, and units, a pixel lies behind an edge.

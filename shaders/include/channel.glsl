@@ -2,6 +2,8 @@
 #ifndef CHANNEL_GLSL
 #define CHANNEL_GLSL
 
+#include "half_precision.glsl"
+
 #ifdef SECONDARY
 const bool IS_SECONDARY = true;
 #define channel_guide secondary_guide
@@ -22,11 +24,8 @@ const bool IS_SECONDARY = false;
 #define channel_moments_before moments_before
 #endif
 
-// Moments are kept in half precision, which ends at 65504 and of whose squares little would be left of a difference: first and
-// second moment of the luminance, frames and share, of and to what is kept.
-const float MOST_KEPT = 6e4;
-const float MOST_FRAMES = 2048.0;
-
+// Moments are kept in half precision, of whose squares little would be left of a difference: first and second moment of the
+// luminance, frames and share, of and to what is kept.
 vec4 moments_of(vec4 kept) {
     return vec4(kept.x, kept.x * kept.x + kept.y * kept.y, kept.zw);
 }

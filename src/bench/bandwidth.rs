@@ -9,7 +9,8 @@ const COPIED: u64 = 512 << 20;
 const COPIES: u32 = 12;
 
 /// Fewest bytes per pixel that a pass must move, each image that it needs read or written once: guide, colours, moments
-/// and what anti-aliasing fetches take 8, radiance, its mean and motion 16. `moving`: the view moves. None for passes that are not the denoiser's or TAA.
+/// and what anti-aliasing fetches take 8, radiance, its mean and motion 16. `moving`: the view moves, the scene does not.
+/// None for passes that are not the denoiser's or TAA.
 pub fn fewest_bytes(pass: &str, moving: bool) -> Option<u32> {
     Some(match pass {
         // Sample, guide and history of guide, irradiance and moments; result and moments.
