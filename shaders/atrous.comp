@@ -26,8 +26,8 @@ const int ROWS = 8;
 const int READ_WIDTH = WIDTH + 2 * STEP;
 const int READ = READ_WIDTH * (ROWS + 2);
 
-// Standard deviations of the difference that two pixels of one surface may have.
-const float SIGMA_LUMINANCE = 4.0;
+// Standard deviations of the difference that two pixels of one surface may have; variances that are hardly known come raised.
+const float SIGMA_LUMINANCE = 1.0;
 // Distance off each other's plane, in pixels at the surface's depth times the step.
 const float SIGMA_PLANE = 0.5;
 // How fast weights fall with 1 − cosine between normals.

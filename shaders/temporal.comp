@@ -26,6 +26,12 @@ const float LEAST_COSINE = 0.9;
 // With fewer frames the variance is estimated over the surroundings.
 const float FEW_FRAMES = 4.0;
 const int SURROUNDINGS = 3;
+// What the pixels around had counts as so many frames where a pixel's own place in the frame before shows another surface: light may
+// end between them, and where a pixel shows now this surface, now that, theirs would be taken again and again.
+const float FRAMES_AROUND = 1.0;
+// A variance known from so many samples that find light is raised to twice its size; one of so many is taken to find light at least.
+const float WELL_KNOWN = 35.0;
+const float RAREST = 16.0;
 // How many standard errors the light that branches off may differ from its surroundings' where the scene has changed.
 const float LAG = 3.0;
 
@@ -138,7 +144,8 @@ Past past_of(ivec2 p, Guide g) {
         colours[i] = shares[i] > 0.0 ? imageLoad(channel_before, q) : uvec4(0);
     }
     [[unroll]] for (int i = 0; i < 4; i++) add(sum, weights, moments[i], colours[i], shares[i]);
-    if (weights < 0.05) {
+    bool around = weights < 0.05;
+    if (around) {
         // None of the four nearest shows the surface: its edge may have run between them.
         ivec2 centre = ivec2(round(place));
         [[dont_unroll]] for (int i = 0; i < 9; i++) {
@@ -148,7 +155,9 @@ Past past_of(ivec2 p, Guide g) {
         }
     }
     if (weights <= 0.0) return past;
-    return Past(sum.irradiance / weights, sum.share / weights, sum.moments / weights, sum.frames / weights);
+    float frames = sum.frames / weights;
+    if (around) frames = min(frames, FRAMES_AROUND);
+    return Past(sum.irradiance / weights, sum.share / weights, sum.moments / weights, frames);
 }
 
 // Mean and second moment of the luminance of this frame's samples around a pixel on the same surface.
@@ -174,6 +183,14 @@ vec3 surroundings(ivec2 p, Guide g, int reach, bool itself) {
         }
     }
     return sum;
+}
+
+// Variance of the mean of samples that have these moments, as high as it may be. `share`: of one sample's variance, what the mean has.
+// Second moment over first moment² is how many samples there are for one that finds light, were all light alike: 1 / share samples are
+// worth so many times fewer (Kish's effective sample size).
+float variance_of_mean(vec2 moments, float share) {
+    float rare = min(moments.y / max(moments.x * moments.x, 1e-20), RAREST);
+    return max(moments.y - moments.x * moments.x, 0.0) * share * (1.0 + WELL_KNOWN * rare * share);
 }
 
 // How much the light at a pixel has changed since the frame before, 0..1.
@@ -221,13 +238,12 @@ void main() {
     vec3 irradiance = mix(past.irradiance, sampled, alpha);
     vec2 moments = mix(past.moments, vec2(l, l * l), alpha);
     float share = (1.0 - alpha) * (1.0 - alpha) * past.share + alpha * alpha;
-    float variance = max(moments.y - moments.x * moments.x, 0.0);
+    float variance = variance_of_mean(moments, share);
     if (frames < FEW_FRAMES) {
         vec3 around = surroundings(p, g, SURROUNDINGS, true);
-        vec2 mean = around.xy / max(around.z, 1.0);
-        variance = max(variance, max(mean.y - mean.x * mean.x, 0.0));
+        variance = max(variance, variance_of_mean(around.xy / max(around.z, 1.0), share));
     }
-    store_result(p, pack_colour(irradiance, variance * share));
+    store_result(p, pack_colour(irradiance, variance));
     imageStore(channel_moments_now, p, kept_moments(moments, frames, share));
     // A pixel of each 16 x 16 tells for all of them how long their history is.
     if (!IS_SECONDARY && ((p.x | p.y) & 15) == 0) {
