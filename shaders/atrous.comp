@@ -47,7 +47,7 @@ const float EMPTY = 1e-30;
 struct Texel {
     float depth;
     vec3 normal;
-    // Squared, of the luminance: what differences are held against.
+    // Variance of the luminance in the unit of `SQUARED`: what differences are held against.
     float deviation;
     // Luminance, red and blue, from which green follows: the filter is linear.
     vec3 lrb;
@@ -149,7 +149,11 @@ void read_all(ivec2 corner) {
         int i = lane + k * 128;
         ivec2 p = place_of(corner, i);
         Texel t = unpacked(guides[k], colours[k]);
-        if (t.depth <= 0.0 || p != clamp(p, ivec2(0), last)) t.depth = EMPTY;
+        if (t.depth <= 0.0 || p != clamp(p, ivec2(0), last)) {
+            t.depth = EMPTY;
+            // Memory that nobody wrote may hold what is no number, which a weight of 0 would not take away.
+            t.lrb = vec3(0.0);
+        }
         if (i < READ) keep(i, t);
     }
 }

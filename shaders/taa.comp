@@ -179,7 +179,7 @@ void main() {
         // Weights grow with the frame's number: early ones were denoised from fewer samples.
         result = vec4(mix(before.rgb, own, max(2.0 / (frames + 1.0), LEAST_STILL)), frames);
     }
-    // Small parts of new frames would be lost to rounding.
+    // In half precision small parts of new frames would be lost to rounding.
     if (FC.still != 0) imageStore(taa_mean, p, result);
     imageStore(taa_now, p, vec4(min(result.rgb, vec3(MOST_KEPT)), min(result.a, MOST_FRAMES)));
 }

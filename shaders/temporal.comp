@@ -26,7 +26,7 @@ const float LEAST_COSINE = 0.9;
 // With fewer frames the variance is estimated over the surroundings.
 const float FEW_FRAMES = 4.0;
 const int SURROUNDINGS = 3;
-// What the pixels around had counts as so many frames where a pixel's own place in the frame before shows another surface: light may
+// What the pixels around had counts as so many frames where its own place in the frame before shows another surface: light may
 // end between them, and where a pixel shows now this surface, now that, theirs would be taken again and again.
 const float FRAMES_AROUND = 1.0;
 // A variance known from so many samples that find light is raised to twice its size; one of so many is taken to find light at least.
@@ -146,7 +146,7 @@ Past past_of(ivec2 p, Guide g) {
     [[unroll]] for (int i = 0; i < 4; i++) add(sum, weights, moments[i], colours[i], shares[i]);
     bool around = weights < 0.05;
     if (around) {
-        // None of the four nearest shows the surface: its edge may have run between them.
+        // Hardly any of the four nearest shows the surface: its edge may have run between them.
         ivec2 centre = ivec2(round(place));
         [[dont_unroll]] for (int i = 0; i < 9; i++) {
             ivec2 q = centre + ivec2(i % 3 - 1, i / 3 - 1);
@@ -200,7 +200,9 @@ float change_at(ivec2 p, Guide g, Past past) {
     // No sample of the frame before is taken again here: what the surroundings show now has to do.
     vec3 around = surroundings(p, g, SURROUNDINGS, true);
     vec2 mean = around.xy / max(around.z, 1.0);
-    float error = sqrt(max(mean.y - mean.x * mean.x, 0.0) / max(around.z, 1.0));
+    // As the samples before spread, too: where none of the few around found light, their own spread is nothing.
+    float spread = max(mean.y - mean.x * mean.x, past.moments.y - past.moments.x * past.moments.x);
+    float error = sqrt(max(spread, 0.0) / max(around.z, 1.0));
     float before = luminance(past.irradiance);
     float off = abs(before - mean.x) - LAG * error;
     return off > 0.0 ? clamp(off / max(before, mean.x), 0.0, 1.0) : 0.0;
@@ -213,7 +215,7 @@ void main() {
     if (IS_SECONDARY && !tile_branches(p / 8)) return;
     Guide g = guide_at(p);
     if (g.depth <= 0.0) {
-        // Nothing of the other channel is read where its guide is empty.
+        // What the other channel's images hold where its guide is empty counts for nothing.
         if (IS_SECONDARY) return;
         store_result(p, uvec4(0));
         imageStore(channel_moments_now, p, kept_moments(vec2(0.0), 0.0, 1.0));

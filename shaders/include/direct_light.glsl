@@ -77,7 +77,7 @@ vec3 direct_light(SurfaceHit at, uint address, inout uvec2 counts) {
     if (solo) count = FC.solo_light == NO_SUCH_LIGHT ? 0 : 1;
     // One light of several candidates is kept in proportion to what each gives without visibility.
 #ifdef LIGHTS_LOBES
-    // What branches off is not denoised.
+    // What branches off is followed now and then only.
     uint candidates = FC.light_candidates * BRANCH_CANDIDATES;
 #else
     uint candidates = FC.light_candidates;

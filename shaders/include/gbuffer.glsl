@@ -14,10 +14,10 @@
 // | secondary | radiance of all that branches off: reflections, but for those that the pixel shows alone; until it is denoised, length of the brightest branch's way, units, 0 where none was followed |
 // | direct | irradiance/π by direct light, not multiplied with the albedo |
 // | composite | radiance of the pixel |
-// | mean, compensation | accumulated radiance: see accumulate.comp |
+// | mean, compensation | accumulated radiance: see composite.comp |
 // | mean_direct, mean_emission, mean_layers | accumulated shares |
 // | display | encoded output |
-// | filter_a, filter_b | denoiser: irradiance/π; variance of its luminance (packed.glsl) |
+// | filter_a, filter_b | denoiser: irradiance/π, or radiance that branches off; variance of its luminance, raised by what is not known of it (packed.glsl) |
 // | gradient_a, gradient_b | one texel per stratum of 3 x 3 pixels: |Δ| of the luminance; the larger luminance |
 // | guide | view depth (0: nothing that reflects), shading normal (2 x 12 bits), 8 bits of material and instance |
 // | irradiance | history: irradiance/π (packed.glsl) |

@@ -1,4 +1,4 @@
-// Extensions and work-group shape of every pass.
+// Extensions of every pass.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference2 : require
 #extension GL_EXT_scalar_block_layout : require

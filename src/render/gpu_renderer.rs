@@ -19,7 +19,11 @@ pub struct GpuRenderer<'a> {
     pub frames: FrameRenderer,
 }
 
-fn floats(image: &Image) -> Result<Vec<[f32; 4]>, GpuError> {
+/// What an image of four channels holds, in single or half precision, row by row.
+///
+/// # Errors
+/// [`GpuError`] of the copy.
+pub fn floats(image: &Image) -> Result<Vec<[f32; 4]>, GpuError> {
     let bytes = image.read_back(0)?;
     if image.format() == vk::Format::R16G16B16A16_SFLOAT {
         let halves = |pixel: &[u8]| bytemuck::pod_read_unaligned::<[u16; 4]>(pixel).map(|h| f16::from_bits(h).to_f32());

@@ -22,6 +22,8 @@ const FRESH_CANDIDATES: u32 = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Key {
     settings: Settings,
+    /// A view of a level of the filter ends there, and what it shows is averaged.
+    levels: u32,
     reuses: bool,
     /// Averaged frames leave no histories.
     filtered: bool,
@@ -66,6 +68,7 @@ fn key(input: &FrameInput) -> Key {
     };
     Key {
         settings: shown,
+        levels: input.settings.shown_levels(),
         reuses: input.reuses(),
         filtered: input.denoises() || input.anti_aliases(),
     }

@@ -165,7 +165,7 @@ impl Settings {
         }
     }
 
-    /// The same for light that branches off, which nothing denoises: more candidates for each light sample.
+    /// The same for light that branches off, which is followed now and then only: more candidates for each light sample.
     pub fn of_branches(&self) -> Self {
         Self {
             candidates: self.candidates * BRANCH_CANDIDATES,
