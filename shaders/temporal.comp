@@ -26,11 +26,12 @@ const float LEAST_COSINE = 0.9;
 // With fewer frames the variance is estimated over the surroundings.
 const float FEW_FRAMES = 4.0;
 const int SURROUNDINGS = 3;
-// What the pixels around had counts as so many frames where its own place in the frame before shows another surface: light may
+// Where a pixel's own place in the frame before shows another surface, what the pixels around had counts as so many frames: light may
 // end between them, and where a pixel shows now this surface, now that, theirs would be taken again and again.
 const float FRAMES_AROUND = 1.0;
-// A variance known from so many samples that find light is raised to twice its size; one of so many is taken to find light at least.
+// A variance that so many samples tell of, all of which find light, is raised to twice its size.
 const float WELL_KNOWN = 35.0;
+// Of so many samples one at least is taken to find light.
 const float RAREST = 16.0;
 // How many standard errors the light that branches off may differ from its surroundings' where the scene has changed.
 const float LAG = 3.0;
