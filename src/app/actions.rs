@@ -8,7 +8,7 @@ use super::journey::{Playback, Recorder};
 use super::lifecycle::StatsRun;
 use crate::console::config;
 use crate::console::settings::settings;
-use crate::console::shell::Action;
+use crate::console::shell::{Action, Panel};
 use crate::game::movement::{EYE, Mode};
 use crate::game::recording::Recording;
 use crate::output::atomic;
@@ -65,7 +65,7 @@ impl Game {
                 Ok(None)
             }
             Action::Toggle(panel) => {
-                self.ui.toggle(panel);
+                self.toggle(panel);
                 Ok(None)
             }
             Action::Condump(name) => self.condump(&name),
@@ -89,6 +89,11 @@ impl Game {
             Ok(None) => {}
             Err(text) => self.shell.log.warn(text),
         }
+    }
+
+    /// Opens or closes a part of the overlay; what came before that is for what was open then.
+    pub(super) fn toggle(&mut self, panel: Panel) {
+        self.ui.toggle(panel, &mut self.platform.egui_input_mut().events);
     }
 
     /// Changes the player, which recordings take note of.

@@ -111,7 +111,7 @@ impl Game {
         let Some(command) = self.shell.binds.get(name).map(str::to_owned) else {
             // Without any key for it, nobody would get into the menu again.
             if name == "ESCAPE" {
-                self.ui.toggle(Panel::Menu);
+                self.toggle(Panel::Menu);
                 return true;
             }
             return !self.ui.wants_pointer();
@@ -120,6 +120,13 @@ impl Game {
             return false;
         }
         for words in tokens::commands(&command) {
+            if words.len() == 1
+                && let Some(panel) = Panel::of_command(&words[0])
+            {
+                // At once: the next key may come before the next frame, and is for what is open by then.
+                self.toggle(panel);
+                continue;
+            }
             match words[0].strip_prefix('+').and_then(commands::button) {
                 Some(button) => self.input.press(button, name),
                 None => {
@@ -146,7 +153,7 @@ impl Game {
 
 /// Whether a key opens and closes panels: it does so while one is open, too, where it does not write.
 fn opens_panels(name: &str, command: &str) -> bool {
-    let panel = matches!(command, "toggleconsole" | "togglemenu" | "settings" | "maps");
+    let panel = Panel::of_command(command).is_some();
     let writes = name.chars().count() == 1 && command != "toggleconsole";
     let function = name.len() > 1 && name.starts_with('F');
     (panel && !writes) || function

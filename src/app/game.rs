@@ -226,7 +226,7 @@ impl Game {
                 if self.level.is_none() {
                     // Nobody would see why nothing is there.
                     self.ui.close_all();
-                    self.ui.toggle(Panel::Console);
+                    self.toggle(Panel::Console);
                 }
             }
         }

@@ -21,6 +21,19 @@ pub enum Panel {
     Maps,
 }
 
+impl Panel {
+    /// The panel that a command opens and closes.
+    pub fn of_command(name: &str) -> Option<Self> {
+        Some(match name.to_ascii_lowercase().as_str() {
+            "toggleconsole" => Self::Console,
+            "togglemenu" => Self::Menu,
+            "settings" => Self::Settings,
+            "maps" => Self::Maps,
+            _ => return None,
+        })
+    }
+}
+
 /// What a text asks the program for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
@@ -298,14 +311,13 @@ impl Shell {
             "viewpos" => actions.push(Action::ViewPos),
             "reloadshaders" => actions.push(Action::ReloadShaders),
             "vid_restart" => actions.push(Action::Restart),
-            "toggleconsole" => actions.push(Action::Toggle(Panel::Console)),
-            "togglemenu" => actions.push(Action::Toggle(Panel::Menu)),
-            "settings" => actions.push(Action::Toggle(Panel::Settings)),
-            "maps" => actions.push(Action::Toggle(Panel::Maps)),
             "condump" => actions.push(Action::Condump(needed()?)),
             "writeconfig" => actions.push(Action::WriteConfig(first)),
             "quit" => actions.push(Action::Quit),
-            _ => return Err(format!("{name} does nothing yet: please report this as a bug")),
+            _ => match Panel::of_command(name) {
+                Some(panel) => actions.push(Action::Toggle(panel)),
+                None => return Err(format!("{name} does nothing yet: please report this as a bug")),
+            },
         }
         Ok(())
     }

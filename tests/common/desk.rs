@@ -123,6 +123,19 @@ impl Desk {
         self.key(&["Return"]);
     }
 
+    /// What is done meanwhile comes to the program between two frames, as where frames take long.
+    pub fn between_frames(&self, doing: impl FnOnce(&Self)) {
+        let signal = |name: &str| {
+            let sent = Command::new("kill")
+                .args([name, &self.program.id().to_string()])
+                .status();
+            assert!(sent.is_ok_and(|status| status.success()), "kill {name}");
+        };
+        signal("-STOP");
+        doing(self);
+        signal("-CONT");
+    }
+
     /// Opens the console, enters lines and closes it. The last must say something that ends in `answer`.
     pub fn console(&mut self, lines: &[&str], answer: &str) -> String {
         self.key(&["grave"]);
@@ -162,6 +175,11 @@ impl Desk {
         image::open(&path)
             .unwrap_or_else(|e| panic!("{}: {e}", path.display()))
             .into_rgb8()
+    }
+
+    /// The first picture of the whole display of which something is true: frames may take long.
+    pub fn seen(&self, name: &str, is: impl Fn(&image::RgbImage) -> bool) -> image::RgbImage {
+        wait_for(name, || Some(self.picture(name)).filter(&is))
     }
 
     /// Where the eye is: x, y, z, yaw, pitch.

@@ -30,6 +30,11 @@ pub struct ConsolePanel {
 }
 
 impl ConsolePanel {
+    /// Whether it has been opened and not been drawn since: its line has no keys yet.
+    pub fn is_new(&self) -> bool {
+        self.wants_focus
+    }
+
     /// The line gets the keys.
     pub fn focus(&mut self) {
         self.wants_focus = true;

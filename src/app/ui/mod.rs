@@ -70,7 +70,7 @@ pub struct Ui {
     menu_open: bool,
     settings_open: bool,
     maps_open: bool,
-    /// Events of the keyboard that wait for the next frame.
+    /// Events that the console has still to see, in later frames.
     later: Vec<egui::Event>,
     /// Hints for those who are here for the first time are shown until then, seconds.
     hints_until: f64,
@@ -95,8 +95,12 @@ impl Ui {
         }
     }
 
-    /// Opens or closes a panel.
-    pub fn toggle(&mut self, panel: Panel) {
+    /// Opens or closes a panel. `before`: events that came before, none of which a frame has seen; what was typed into the console until
+    /// it closes is still done.
+    pub fn toggle(&mut self, panel: Panel, before: &mut Vec<egui::Event>) {
+        if self.console_open {
+            self.later.append(before);
+        }
         let open = match panel {
             Panel::Console => &mut self.console_open,
             Panel::Menu => {
@@ -139,10 +143,13 @@ impl Ui {
 
     /// Keys that do something with the console's line act on what was typed before them, and not on what is typed after: where one frame
     /// brings several, the rest waits for the next.
-    fn in_order(&mut self, mut input: egui::RawInput) -> egui::RawInput {
+    fn in_order(&mut self, mut input: egui::RawInput, console_shown: bool) -> egui::RawInput {
         let mut events = std::mem::take(&mut self.later);
         events.append(&mut input.events);
-        if self.console_open {
+        if console_shown && self.console.is_new() {
+            // Its line has the keys once it has been drawn.
+            self.later = std::mem::take(&mut events);
+        } else if console_shown {
             // A held key that repeats faster than frames come does not go on after it was let go.
             let mut repeats = 0;
             events.retain(|event| {
@@ -164,7 +171,9 @@ impl Ui {
 
     /// Builds the overlay for a frame.
     pub fn show(&mut self, input: egui::RawInput, facts: &Facts<'_>, shell: &mut Shell) -> egui::FullOutput {
-        let input = self.in_order(input);
+        // What was typed until it closed has still to be done.
+        let console_shown = self.console_open || !self.later.is_empty();
+        let input = self.in_order(input, console_shown);
         self.context.set_zoom_factor(shell.cvars.number("con_scale") as f32);
         let context = self.context.clone();
         context.run_ui(input, |ui| {
@@ -184,12 +193,12 @@ impl Ui {
                     Some(menu::Choice::Resume) => self.menu_open = false,
                     Some(menu::Choice::Open(panel)) => {
                         self.menu_open = false;
-                        self.toggle(panel);
+                        self.toggle(panel, &mut Vec::new());
                     }
                     None => {}
                 }
             }
-            if self.console_open {
+            if console_shown || self.console_open {
                 self.console.show(&ctx, shell);
             }
         })
