@@ -1,6 +1,6 @@
 #version 460
 // Gradient stage of the denoiser: how much the light of a stratum has changed since the frame before. One of that frame's
-// pixels is shaded again: the same surface point with the same random numbers, where samples are reused the same light sample,
+// pixels is shaded again: the same surface point, where it has moved to, with the same random numbers, where samples are reused the same light sample,
 // under this frame's lights. Where nothing has changed the difference is exactly nothing (Schied, Peters and Dachsbacher 2018,
 // section 4).
 //
@@ -16,6 +16,7 @@
 #include "light_choice.glsl"
 #include "gbuffer.glsl"
 #include "guide.glsl"
+#include "moved.glsl"
 #include "visibility.glsl"
 #include "reservoir.glsl"
 #include "direct_light.glsl"
@@ -31,12 +32,21 @@ vec2 change_of(uvec2 stratum, inout uvec2 counts) {
     uvec2 strata = strata_size();
     uvec2 old = uvec2(clamp(round(place), vec2(0.0), vec2(FC.size - 1u))) / uint(STRATUM);
     Stratum kept = FC.strata.at[old.y * strata.x + old.x];
-    if (kept.row == NONE) return vec2(0.0);
+    uvec4 object = imageLoad(gbuffer_object, p);
+    // Of another surface nothing is learnt about this one.
+    if (kept.row == NONE || kept.instance != object.y) return vec2(0.0);
     SurfaceHit at;
     at.position = kept.position;
     at.shading_normal = unpack_normal(kept.shading_normal);
     at.geometric_normal = unpack_normal(kept.geometric_normal);
     at.row = kept.row;
+    Instance instance = FC.instances.at[object.y];
+    if (deforms(object.x)) {
+        Hit seen = Hit(0.0, object.x, object.y, unpackUnorm2x16(object.z));
+        at.position += imageLoad(gbuffer_position, p).xyz - old_position_of(instance, seen);
+    } else if (instance.moves != 0) {
+        take_along(instance, at);
+    }
     float now;
     if (FC.reservoirs_used != 0) {
         if (kept.light == NONE || kept.luminance <= 0.0) return vec2(0.0);

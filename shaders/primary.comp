@@ -13,27 +13,13 @@
 #include "gbuffer.glsl"
 #include "guide.glsl"
 #include "layers.glsl"
-#include "deform.glsl"
+#include "moved.glsl"
 #include "secondary_tiles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // Distance of what is seen where nothing is met, units.
 const float FAR_AWAY = 1e9;
-
-// Where a point was in the frame before.
-vec3 old_position_of(Instance i, Hit hit) {
-    Triangle t = FC.triangles.at[hit.triangle];
-    vec3 p[3];
-    for (uint k = 0; k < 3; k++) {
-        uint vertex = t.vertices[k];
-        p[k] = vertex >= FC.first_dynamic_vertex ? deformed(vertex, true).position
-                                                 : FC.positions.at[vertex];
-    }
-    vec2 b = hit.barycentrics;
-    vec4 q = vec4(p[0] * (1.0 - b.x - b.y) + p[1] * b.x + p[2] * b.y, 1.0);
-    return vec3(dot(i.old_object_to_world[0], q), dot(i.old_object_to_world[1], q), dot(i.old_object_to_world[2], q));
-}
 
 // Pixels of the work group of which something branches off, and the first one's place among all.
 shared uint group_pixels;
@@ -106,8 +92,7 @@ bool shoot(uvec2 pixel) {
     vec2 motion = sky ? motion_of_direction(direction) : motion_of(place);
     vec3 old_position = place;
     Instance instance = FC.instances.at[hit.instance];
-    bool dynamic = FC.triangles.at[hit.triangle].vertices[0] >= FC.first_dynamic_vertex;
-    if (instance.moves != 0 || dynamic) {
+    if (instance.moves != 0 || deforms(hit.triangle)) {
         old_position = mapped(seen.place, old_position_of(instance, hit), 1.0);
         motion = motion_between(place - FC.eye, old_position - FC.old_eye);
     }

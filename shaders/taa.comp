@@ -2,7 +2,7 @@
 // Temporal anti-aliasing: the composed radiance, one place in each pixel per frame, blended with that of frames before.
 //
 // Linear light, weighted by 1/(1 + Y·exposure) so that bright edges do not win (Karis 2014). All pixels of a frame are looked at in
-// the same place of theirs, which is not their centre: where the view moves, what each shows at its centre is interpolated from
+// the same place of theirs, which is not their centre: where view or scene change, what each shows at its centre is interpolated from
 // its surroundings, or textures would tremble with the place. History is fetched with a cubic
 // filter along the motion of the surface, at edges of the nearest one around, and held to the mean ± γ standard deviations of the
 // pixel's surroundings in YCoCg (Salvi 2016). While view and scene stand still nothing is held back, and the result is the

@@ -29,7 +29,7 @@ const MOST: u32 = 64;
 
 /// A box with a lamp under its ceiling, and below that a board that a door carries.
 fn board() -> Scene {
-    let script = "textures/fixture/board\n{\n\t{\n\t\tmap $whiteimage\n\t}\n}\n";
+    let script = "textures/fixture/board\n{\n\t{\n\t\tmap $lightmap\n\t}\n\t{\n\t\tmap $whiteimage\n\t\tblendFunc filter\n\t}\n}\n";
     scene(&boxed("board", script, |map, _| {
         let paint = Paint {
             shader: map.shader("textures/fixture/board", surface_flags::NODLIGHT, content_flags::SOLID),
@@ -62,16 +62,22 @@ fn view() -> Camera {
     camera([16.0, 128.0, 90.0], 25.0, 0.0, 90.0)
 }
 
-/// What a frame shows beside the map.
+/// From below: the board's lower face and nothing else in the middle of the image.
+fn view_of_board(y: f32, fov: f32) -> Camera {
+    camera([140.0, y, 20.0], -89.0, 0.0, fov)
+}
+
+/// What a frame shows beside the map, and from where.
 #[derive(Clone, Copy)]
 struct Shown<'a> {
+    camera: Camera,
     lights: &'a [Light],
     entities: &'a [EntityState],
 }
 
 fn input<'a>(shown: Shown<'a>, settings: &Settings, index: u32, accumulated: u32) -> FrameInput<'a> {
     FrameInput {
-        camera: view(),
+        camera: shown.camera,
         settings: *settings,
         lights: shown.lights,
         polygons: &[],
@@ -96,8 +102,16 @@ fn truth(renderer: &GpuRenderer, shown: Shown<'_>) -> Vec<[f32; 3]> {
     film(&view, 64).unwrap().mean
 }
 
-/// Mean over the pixels of the lower half whose truth changes by more than three tenths.
-fn region(before: &[[f32; 3]], after: &[[f32; 3]]) -> Vec<usize> {
+/// The middle of the image.
+fn middle(_: &[[f32; 3]], _: &[[f32; 3]]) -> Vec<usize> {
+    let (width, height) = (SIZE.0 as usize, SIZE.1 as usize);
+    (0..width * height)
+        .filter(|i| (i % width).abs_diff(width / 2) < width / 4 && (i / width).abs_diff(height / 2) < height / 4)
+        .collect()
+}
+
+/// Pixels of the lower half whose truth changes by more than three tenths.
+fn changed(before: &[[f32; 3]], after: &[[f32; 3]]) -> Vec<usize> {
     let half = before.len() / 2;
     (half..before.len())
         .filter(|i| {
@@ -111,8 +125,11 @@ fn mean(image: &[[f32; 3]], region: &[usize]) -> f64 {
     region.iter().map(|i| f64::from(image[*i][1])).sum::<f64>() / region.len() as f64
 }
 
+/// Pixels to look at, by the truth before and after.
+type Region = fn(&[[f32; 3]], &[[f32; 3]]) -> Vec<usize>;
+
 /// Frames after the last of `steps` until the region's mean is within 10% of the new truth and stays there for 8 frames.
-fn frames_to_follow(renderer: &GpuRenderer, steps: &[Shown<'_>], gradients: bool) -> u32 {
+fn frames_to_follow(renderer: &GpuRenderer, steps: &[Shown<'_>], gradients: bool, region: Region) -> u32 {
     let (first, last) = (steps[0], steps[steps.len() - 1]);
     let (before, after) = (truth(renderer, first), truth(renderer, last));
     let region = region(&before, &after);
@@ -145,25 +162,47 @@ fn what_changes_is_followed_within_four_frames_with_gradients() {
         let renderer = GpuRenderer::new(&gpu).unwrap();
         let number = scene.entities.iter().position(|e| e.class() == "func_door").unwrap() as u32;
         let lamp = [point_light(Vec3::new(100.0, 70.0, 60.0), 200.0, Vec3::ONE)];
-        let at = |offset: f32| {
+        let below = [point_light(Vec3::new(140.0, 90.0, 30.0), 200.0, Vec3::ONE)];
+        let near = [point_light(Vec3::new(140.0, 128.0, 130.0), 50.0, Vec3::ONE)];
+        let at = |offset: Vec3| {
             [EntityState {
                 entity: number,
-                offset: Vec3::Y * offset,
+                offset,
                 hidden: false,
             }]
         };
-        let places: Vec<_> = (0..=8).map(|i| at(10.0 * i as f32)).collect();
-        let slides: Vec<Shown<'_>> = places.iter().map(|entities| Shown { lights: &[], entities }).collect();
-        let still = |lights| Shown { lights, entities: &[] };
-        let cases: [(&str, Vec<Shown<'_>>); 4] = [
-            ("a lamp goes out", vec![still(&lamp), still(&[])]),
-            ("a lamp goes on", vec![still(&[]), still(&lamp)]),
-            ("a board moves out of the light at once", vec![slides[0], slides[8]]),
-            ("a board moves out of the light in 8 frames", slides.clone()),
+        let along = |way: Vec3| -> Vec<_> { (0..=8).map(|i| at(way * i as f32)).collect() };
+        let shown = |camera: Camera, lights, entities| Shown {
+            camera,
+            lights,
+            entities,
+        };
+        let (aside, past, down) = (along(Vec3::Y * 10.0), along(Vec3::Y * 5.0), along(Vec3::NEG_Z * 8.0));
+        let slides: Vec<_> = aside.iter().map(|places| shown(view(), &[], &places[..])).collect();
+        let passes: Vec<_> = past
+            .iter()
+            .map(|places| shown(view_of_board(148.0, 14.0), &near, &places[..]))
+            .collect();
+        let sinks: Vec<_> = down
+            .iter()
+            .map(|places| shown(view_of_board(128.0, 40.0), &below, &places[..]))
+            .collect();
+        let (lit, unlit) = (shown(view(), &lamp, &[]), shown(view(), &[], &[]));
+        let cases: [(&str, Vec<Shown<'_>>, Region); 6] = [
+            ("a lamp goes out", vec![lit, unlit], changed),
+            ("a lamp goes on", vec![unlit, lit], changed),
+            (
+                "a board moves out of the light at once",
+                vec![slides[0], slides[8]],
+                changed,
+            ),
+            ("a board moves out of the light in 8 frames", slides.clone(), changed),
+            ("a board passes by a lamp in 8 frames", passes, middle),
+            ("a board moves to a lamp in 8 frames", sinks, middle),
         ];
-        for (name, steps) in &cases {
-            let with = frames_to_follow(&renderer, steps, true);
-            let without = frames_to_follow(&renderer, steps, false);
+        for (name, steps, region) in &cases {
+            let with = frames_to_follow(&renderer, steps, true, *region);
+            let without = frames_to_follow(&renderer, steps, false, *region);
             println!("{name}: {with} frames with gradients, {without} without");
             assert!(with <= 4, "{name}: {with} frames with gradients");
             assert!(without > with, "{name}: {without} frames without gradients");

@@ -270,6 +270,7 @@ fn records() -> Vec<Record> {
             shading_normal,
             geometric_normal,
             row,
+            instance,
             address,
             sample_index,
             light,

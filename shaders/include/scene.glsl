@@ -282,6 +282,8 @@ struct Stratum {
     uint geometric_normal;
     // Light row of the receiver; NONE where the pixel showed nothing that reflects.
     uint row;
+    // What it lies on.
+    uint instance;
     // Address and index of its random numbers.
     uint address;
     uint sample_index;

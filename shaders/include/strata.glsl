@@ -4,6 +4,7 @@
 #ifndef STRATA_GLSL
 #define STRATA_GLSL
 
+#include "gbuffer.glsl"
 #include "gradient.glsl"
 #include "luminance.glsl"
 
@@ -16,8 +17,9 @@ bool stands_for_stratum(uvec2 pixel) {
     return pixel == chosen;
 }
 
-// Keeps a pixel's shading. `kept` holds receiver and light sample; address, index and luminance are filled in.
+// Keeps a pixel's shading. `kept` holds receiver and light sample; instance, address, index and luminance are filled in.
 void keep_stratum(uvec2 pixel, Stratum kept, vec3 irradiance) {
+    kept.instance = imageLoad(gbuffer_object, ivec2(pixel)).y;
     kept.address = pixel.x + (pixel.y << 16);
     kept.sample_index = sample_index;
     kept.luminance = luminance(irradiance);

@@ -1,5 +1,6 @@
 //! A run without a window: a fly-through with statistics, for machines without a display.
 
+use super::capture::display_pixels;
 use crate::cli::CliError;
 use crate::console::Cvars;
 use crate::console::settings::settings;
@@ -7,7 +8,7 @@ use crate::content::fly_through;
 use crate::engine::{Engine, Job, Prepared};
 use crate::gpu::SubmitSync;
 use crate::output::stats::{FrameStats, RunStats, Summary};
-use crate::output::{atomic, picture, stdout};
+use crate::output::{OutputError, atomic, picture, png_file, stdout};
 use crate::reference::direct::RayCounts;
 use crate::render::film::Film;
 use crate::render::frame::FrameInput;
@@ -30,7 +31,22 @@ const FLIGHT: u32 = 56;
 pub struct Run {
     /// The last frame; on the CPU the mean of all.
     pub film: Film,
+    /// What the window would show of the last frame, row by row from the top, where that is one of its intermediate images (`rt_view`).
+    pub display: Option<Vec<[u8; 3]>>,
     pub frames: Vec<FrameStats>,
+}
+
+impl Run {
+    /// Writes what was rendered, by the extension of the name: see [`picture::write`].
+    ///
+    /// # Errors
+    /// [`OutputError`] naming the file.
+    pub fn write(&self, path: &Path, settings: &Settings) -> Result<(), OutputError> {
+        match &self.display {
+            Some(pixels) => png_file::write(path, self.film.width, self.film.height, pixels, &[]),
+            None => picture::write(path, &self.film, settings),
+        }
+    }
 }
 
 /// A loop of frames.
@@ -59,6 +75,11 @@ pub fn run_frames(
 ) -> Result<Run, CliError> {
     let (count, path) = (job.count, job.path);
     let scene = match prepared {
+        Prepared::Cpu(_) if job.settings.view != 0 => {
+            return Err(CliError::Failed(
+                "rt_view shows what a frame on a Vulkan device is made of: the CPU tracer has none (--aov writes its images)".to_owned(),
+            ));
+        }
         Prepared::Cpu(_) => {
             note("the CPU tracer has no frame loop: accumulating as many samples of the last view instead");
             let start = Instant::now();
@@ -85,7 +106,11 @@ pub fn run_frames(
                     history: None,
                 })
                 .collect();
-            return Ok(Run { film, frames });
+            return Ok(Run {
+                film,
+                display: None,
+                frames,
+            });
         }
         Prepared::Gpu(scene) => scene.clone(),
     };
@@ -128,7 +153,12 @@ pub fn run_frames(
         shown_film(&realtime.view)
     }
     .map_err(CliError::failed)?;
-    Ok(Run { film, frames })
+    let display = (job.settings.view != 0).then(|| display_pixels(&realtime.view));
+    Ok(Run {
+        film,
+        display: display.transpose().map_err(CliError::Failed)?,
+        frames,
+    })
 }
 
 /// Statistics of a run with what is needed to repeat it.
@@ -183,10 +213,10 @@ pub fn run(
         frame_time: 0.0,
     };
     let run = run_frames(&prepared, &job, progress, &|text| eprintln!("{text}"))?;
-    let stats = run_stats(engine, cvars, &scene.name, SIZE, run.frames);
     let picture = folder.join("frame.png");
     atomic::create_parent(&picture).map_err(CliError::failed)?;
-    picture::write(&picture, &run.film, &settings).map_err(CliError::failed)?;
+    run.write(&picture, &settings).map_err(CliError::failed)?;
+    let stats = run_stats(engine, cvars, &scene.name, SIZE, run.frames);
     let (json, csv) = (folder.join("stats.json"), folder.join("stats.csv"));
     stats.write(&json).map_err(CliError::failed)?;
     stats.write(&csv).map_err(CliError::failed)?;

@@ -3,12 +3,12 @@
 use super::args::{CliError, CliResult};
 use super::common::{Common, progress};
 use super::view::{ViewArgs, parse_camera, parse_size};
-use crate::app::headless::{Loop, run_frames, run_stats};
+use crate::app::headless::{Loop, Run, run_frames, run_stats};
 use crate::console::Cvars;
 use crate::console::settings::{FRAME_RATE, settings};
 use crate::engine::Job;
 use crate::output::stats::FrameStats;
-use crate::output::{OutputError, atomic, exr_file, picture};
+use crate::output::{OutputError, atomic, exr_file};
 use crate::reference::direct::RayCounts;
 use crate::render::film::{Aovs, Film};
 use crate::render::settings::Settings;
@@ -126,12 +126,14 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         atomic::create_parent(&args.out).map_err(CliError::failed)?;
         return super::path::run(common, &cvars, &args, &path);
     }
-    let known = args
-        .out
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png") || e.eq_ignore_ascii_case("exr"));
-    if !known {
+    let ends_in = |wanted: &str| args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
+    if !ends_in("png") && !ends_in("exr") {
         return Err(CliError::Usage(OutputError::Extension { path: args.out }.to_string()));
+    }
+    if cvars.number("rt_view") != 0.0 && (args.frames.is_none() || !ends_in("png")) {
+        return Err(CliError::Usage(
+            "rt_view shows what a frame is made of, as a picture: --frames N --out F.png (--aov writes such images as EXR)".to_owned(),
+        ));
     }
     atomic::create_parent(&args.out).map_err(CliError::failed)?;
     let (scene, _) = common.lit_scene(&args.map, &cvars)?;
@@ -157,7 +159,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
     let prepared = engine.prepare(&scene).map_err(CliError::failed)?;
     let bar = progress(1000, &args.map);
     let advance = |share: f32| bar.set_position((share * 1000.0) as u64);
-    let (film, frames) = if let Some(count) = args.frames {
+    let run = if let Some(count) = args.frames {
         let note = |text: &str| eprintln!("{text}");
         let job = Loop {
             size: args.size,
@@ -167,8 +169,7 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
             accumulate: cvars.number("rt_accumulate") != 0.0,
             frame_time: args.fps.map_or(0.0, |fps| 1.0 / fps),
         };
-        let run = run_frames(&prepared, &job, &advance, &note)?;
-        (run.film, run.frames)
+        run_frames(&prepared, &job, &advance, &note)?
     } else {
         let job = Job {
             camera: shot,
@@ -178,20 +179,25 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         };
         let start = Instant::now();
         let (film, rays) = prepared.accumulate(job, &advance).map_err(CliError::failed)?;
-        (film, vec![accumulation_stats(start, rays)])
+        Run {
+            film,
+            display: None,
+            frames: vec![accumulation_stats(start, rays)],
+        }
     };
     bar.finish_and_clear();
-    if film.non_finite() > 0 {
-        eprintln!("warning: {} pixels are not finite", film.non_finite());
+    let non_finite = run.film.non_finite();
+    if non_finite > 0 {
+        eprintln!("warning: {non_finite} pixels are not finite");
     }
-    picture::write(&args.out, &film, &settings).map_err(CliError::failed)?;
+    run.write(&args.out, &settings).map_err(CliError::failed)?;
     if let Some(path) = &args.stats {
-        let stats = run_stats(&engine, &cvars, &args.map, args.size, frames);
+        let stats = run_stats(&engine, &cvars, &args.map, args.size, run.frames);
         stats.write(path).map_err(CliError::failed)?;
     }
     if let Some(folder) = &args.aov {
         let aovs = prepared.aovs(&camera, args.size, &settings).map_err(CliError::failed)?;
-        write_aovs(folder, &film, &aovs).map_err(CliError::failed)?;
+        write_aovs(folder, &run.film, &aovs).map_err(CliError::failed)?;
     }
     Ok(())
 }

@@ -27,6 +27,7 @@ impl Direct {
             Use::image(g.albedo(), Access::ComputeRead),
             Use::image(g.position(), Access::ComputeRead),
             Use::image(g.surface(), Access::ComputeRead),
+            Use::image(g.object(), Access::ComputeRead),
             Use::image(g.direct(), Access::ComputeWrite),
             Use::buffer(counters, Access::ComputeReadWrite),
             Use::buffer(&strata.buffer, Access::ComputeWrite),

@@ -25,6 +25,8 @@ impl Gradient {
         let g = r.gbuffer;
         let uses = [
             Use::image(g.motion(), Access::ComputeRead),
+            Use::image(g.position(), Access::ComputeRead),
+            Use::image(g.object(), Access::ComputeRead),
             Use::buffer(&strata.buffer, Access::ComputeRead),
             Use::buffer(counters, Access::ComputeReadWrite),
             Use::image(g.gradient_a(), Access::ComputeWrite),

@@ -32,6 +32,7 @@ impl Reuse {
         let g = r.gbuffer;
         let uses = [
             Use::image(g.position(), Access::ComputeRead),
+            Use::image(g.object(), Access::ComputeRead),
             Use::image(g.direct(), Access::ComputeWrite),
             Use::buffer(&reservoirs.current, Access::ComputeRead),
             Use::buffer(&reservoirs.history, Access::ComputeWrite),

@@ -16,6 +16,7 @@ pub struct Stratum {
     pub shading_normal: u32,
     pub geometric_normal: u32,
     pub row: u32,
+    pub instance: u32,
     pub address: u32,
     pub sample_index: u32,
     pub light: u32,
