@@ -83,7 +83,7 @@ fn somebody_plays() {
         desk.key(&["grave", "n"]);
     });
     desk.wait("walking through walls");
-    desk.wait(" typed at once\n");
+    desk.wait(": typed at once\n");
     desk.console(&["noclip"], "walking\n");
     let all = desk.text();
     let said = |line: &str| all.lines().filter(|l| l.ends_with(line)).count();
@@ -101,7 +101,7 @@ fn somebody_plays() {
     // The console: completion by Tab, values, and a dark shade behind the text.
     let closed = desk.picture("4_closed");
     desk.key(&["grave"]);
-    desk.seen("5_console", |open| {
+    let console = desk.seen("5_console", |open| {
         brightness(open, UPPER) < 0.6 * brightness(&closed, UPPER)
     });
     desk.key(&["r", "t", "underscore", "c", "u", "l", "Tab"]);
@@ -126,7 +126,8 @@ fn somebody_plays() {
     desk.wait(&format!("{MAP} loaded"));
     desk.key(&["grave"]);
     desk.seen("7_another_map", |map| {
-        difference(map, &start, MIDDLE) > 0.3 && brightness(map, INSIDE) > 8.0
+        let anew = difference(map, &start, MIDDLE) > 0.3 && difference(map, &console, UPPER) > 0.3;
+        anew && brightness(map, INSIDE) > 8.0
     });
 
     // A jump pad throws upwards, a teleporter puts elsewhere.

@@ -119,8 +119,10 @@ impl Game {
         if self.ui.wants_pointer() && !(keyboard && opens_panels(name, &command)) {
             return false;
         }
+        let mut queued = false;
         for words in tokens::commands(&command) {
-            if words.len() == 1
+            if !queued
+                && words.len() == 1
                 && let Some(panel) = Panel::of_command(&words[0])
             {
                 // At once: the next key may come before the next frame, and is for what is open by then.
@@ -132,6 +134,7 @@ impl Game {
                 None => {
                     let quoted: Vec<String> = words.iter().map(|w| tokens::quoted(w)).collect();
                     self.shell.push(&quoted.join(" "));
+                    queued = true;
                 }
             }
         }
@@ -153,8 +156,8 @@ impl Game {
 
 /// Whether a key opens and closes panels: it does so while one is open, too, where it does not write.
 fn opens_panels(name: &str, command: &str) -> bool {
-    let panel = Panel::of_command(command).is_some();
-    let writes = name.chars().count() == 1 && command != "toggleconsole";
+    let panel = Panel::of_command(command);
+    let writes = name.chars().count() == 1 && panel != Some(Panel::Console);
     let function = name.len() > 1 && name.starts_with('F');
-    (panel && !writes) || function
+    (panel.is_some() && !writes) || function
 }

@@ -121,19 +121,21 @@ pub fn run(common: &Common, mut cvars: Cvars, args: Args) -> CliResult {
         let note = cvars.set("cg_fov", fov).map_err(|e| CliError::Usage(e.to_string()))?;
         note.into_iter().for_each(|n| eprintln!("{n}"));
     }
+    let ends_in = |wanted: &str| args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
+    let is_frame = args.frames.is_some() || args.path.is_some();
+    if cvars.number("rt_view") != 0.0 && (!is_frame || ends_in("exr")) {
+        return Err(CliError::Usage(
+            "rt_view shows what a frame is made of, as a picture: --frames N (or --path F.json) and --out F.png (--aov writes such images as EXR)"
+                .to_owned(),
+        ));
+    }
     // An output that cannot be written is told before the work is done, not after it.
     if let Some(path) = args.path.clone() {
         atomic::create_parent(&args.out).map_err(CliError::failed)?;
         return super::path::run(common, &cvars, &args, &path);
     }
-    let ends_in = |wanted: &str| args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
     if !ends_in("png") && !ends_in("exr") {
         return Err(CliError::Usage(OutputError::Extension { path: args.out }.to_string()));
-    }
-    if cvars.number("rt_view") != 0.0 && (args.frames.is_none() || !ends_in("png")) {
-        return Err(CliError::Usage(
-            "rt_view shows what a frame is made of, as a picture: --frames N --out F.png (--aov writes such images as EXR)".to_owned(),
-        ));
     }
     atomic::create_parent(&args.out).map_err(CliError::failed)?;
     let (scene, _) = common.lit_scene(&args.map, &cvars)?;

@@ -40,7 +40,17 @@ impl Desk {
         prepare(home.path());
         let number = home.path().join("display");
         let mut xvfb = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp"])
+            // It would begin anew whenever its last client leaves, and turn away who comes meanwhile.
+            .args([
+                "-displayfd",
+                "1",
+                "-noreset",
+                "-screen",
+                "0",
+                "1024x768x24",
+                "-nolisten",
+                "tcp",
+            ])
             .stdout(std::fs::File::create(&number).expect("a file"))
             .stderr(Stdio::null())
             .spawn()

@@ -35,6 +35,11 @@ impl ConsolePanel {
         self.wants_focus
     }
 
+    #[cfg(test)]
+    pub fn drawn(&mut self) {
+        self.wants_focus = false;
+    }
+
     /// The line gets the keys.
     pub fn focus(&mut self) {
         self.wants_focus = true;
@@ -205,6 +210,24 @@ pub fn acts_on_line(event: &egui::Event) -> bool {
         return false;
     };
     *pressed && matches!(key, Key::Enter | Key::Tab | Key::ArrowUp | Key::ArrowDown)
+}
+
+/// A held key that repeats faster than frames come acts once a frame, and does not go on after it was let go. (Events do not tell yet
+/// that they are repeats.)
+pub fn drop_repeats(events: &mut Vec<egui::Event>) {
+    let mut down = Vec::new();
+    events.retain(|event| {
+        let egui::Event::Key { key, pressed, .. } = event else {
+            return true;
+        };
+        let repeats = *pressed && down.contains(key) && acts_on_line(event);
+        if !*pressed {
+            down.retain(|k| k != key);
+        } else if !repeats {
+            down.push(*key);
+        }
+        !repeats
+    });
 }
 
 /// Whether a key was let go.

@@ -70,6 +70,8 @@ pub struct Ui {
     menu_open: bool,
     settings_open: bool,
     maps_open: bool,
+    /// Events that came before the console was opened: they are for what was open then.
+    earlier: Vec<egui::Event>,
     /// Events that the console has still to see, in later frames.
     later: Vec<egui::Event>,
     /// Hints for those who are here for the first time are shown until then, seconds.
@@ -90,6 +92,7 @@ impl Ui {
             menu_open: false,
             settings_open: false,
             maps_open: false,
+            earlier: Vec::new(),
             later: Vec::new(),
             hints_until: if hints { HINTS } else { 0.0 },
         }
@@ -100,6 +103,8 @@ impl Ui {
     pub fn toggle(&mut self, panel: Panel, before: &mut Vec<egui::Event>) {
         if self.console_open {
             self.later.append(before);
+        } else if panel == Panel::Console {
+            self.earlier.append(before);
         }
         let open = match panel {
             Panel::Console => &mut self.console_open,
@@ -144,19 +149,14 @@ impl Ui {
     /// Keys that do something with the console's line act on what was typed before them, and not on what is typed after: where one frame
     /// brings several, the rest waits for the next.
     fn in_order(&mut self, mut input: egui::RawInput, console_shown: bool) -> egui::RawInput {
+        let earlier = std::mem::take(&mut self.earlier);
         let mut events = std::mem::take(&mut self.later);
         events.append(&mut input.events);
         if console_shown && self.console.is_new() {
             // Its line has the keys once it has been drawn.
             self.later = std::mem::take(&mut events);
         } else if console_shown {
-            // A held key that repeats faster than frames come does not go on after it was let go.
-            let mut repeats = 0;
-            events.retain(|event| {
-                let repeat = console::acts_on_line(event) && matches!(event, egui::Event::Key { repeat: true, .. });
-                repeats += usize::from(repeat);
-                !repeat || repeats == 1
-            });
+            console::drop_repeats(&mut events);
             let acts = events.iter().position(console::acts_on_line);
             let cut = match acts {
                 Some(0) => 1 + usize::from(events.len() > 1 && console::is_release(&events[1])),
@@ -165,7 +165,8 @@ impl Ui {
             };
             self.later = events.split_off(cut);
         }
-        input.events = events;
+        input.events = earlier;
+        input.events.append(&mut events);
         input
     }
 
@@ -202,5 +203,77 @@ impl Ui {
                 self.console.show(&ctx, shell);
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Event, Key, Modifiers, RawInput};
+
+    fn text(text: &str) -> Event {
+        Event::Text(text.to_owned())
+    }
+
+    fn press(key: Key, pressed: bool) -> Event {
+        Event::Key {
+            key,
+            physical_key: None,
+            pressed,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        }
+    }
+
+    /// What a frame brings, and what of it the overlay gets to see then.
+    fn frame(ui: &mut Ui, events: Vec<Event>) -> Vec<Event> {
+        let shown = ui.console_open || !ui.later.is_empty();
+        let input = RawInput {
+            events,
+            ..RawInput::default()
+        };
+        let seen = ui.in_order(input, shown).events;
+        if shown && ui.console.is_new() {
+            ui.console.drawn();
+        }
+        seen
+    }
+
+    #[test]
+    fn what_was_typed_before_the_console_opened_is_not_its() {
+        let mut ui = Ui::new(Arc::new(Vfs::mount(&[], &[])), false);
+        ui.toggle(Panel::Settings, &mut Vec::new());
+        ui.toggle(Panel::Console, &mut vec![text("search")]);
+        assert_eq!(frame(&mut ui, vec![text("typed")]), [text("search")]);
+        assert_eq!(frame(&mut ui, Vec::new()), [text("typed")]);
+    }
+
+    #[test]
+    fn what_was_typed_until_the_console_closed_is_done() {
+        let mut ui = Ui::new(Arc::new(Vfs::mount(&[], &[])), false);
+        ui.toggle(Panel::Console, &mut Vec::new());
+        let (down, up) = (press(Key::Enter, true), press(Key::Enter, false));
+        ui.toggle(Panel::Console, &mut vec![text("echo"), down.clone(), up.clone()]);
+        assert!(!ui.wants_pointer());
+        assert_eq!(frame(&mut ui, Vec::new()), []);
+        assert_eq!(frame(&mut ui, Vec::new()), [text("echo")]);
+        assert_eq!(frame(&mut ui, Vec::new()), [down, up]);
+        assert!(ui.later.is_empty());
+    }
+
+    #[test]
+    fn a_held_key_ends_when_it_is_let_go() {
+        let mut ui = Ui::new(Arc::new(Vfs::mount(&[], &[])), false);
+        ui.toggle(Panel::Console, &mut Vec::new());
+        assert_eq!(frame(&mut ui, Vec::new()), []);
+        let (down, up) = (press(Key::ArrowUp, true), press(Key::ArrowUp, false));
+        let mut events = vec![down.clone(); 20];
+        events.push(up.clone());
+        assert_eq!(frame(&mut ui, events), [down.clone(), up.clone()]);
+        assert!(ui.later.is_empty());
+        // Pressed twice, it acts twice.
+        let twice = vec![down.clone(), up.clone(), down.clone(), up.clone()];
+        assert_eq!(frame(&mut ui, twice), [down.clone(), up.clone()]);
+        assert_eq!(frame(&mut ui, Vec::new()), [down, up]);
     }
 }
