@@ -1,8 +1,8 @@
 #version 460
 // Gradient stage of the denoiser: how much the light of a stratum has changed since the frame before. One of that frame's
-// pixels is shaded again: the same surface point, where it has moved to, with the same random numbers, where samples are reused the same light sample,
-// under this frame's lights. Where nothing has changed the difference is exactly nothing (Schied, Peters and Dachsbacher 2018,
-// section 4).
+// pixels is shaded again: the same surface point, where it has moved to, with the same random numbers, where samples are reused
+// the same light sample, under this frame's lights. Where nothing has changed the difference is exactly nothing (Schied, Peters
+// and Dachsbacher 2018, section 4).
 //
 // gradient_a: |Δ| of the luminance and the larger of the two, filtered apart; their ratio is the change.
 #extension GL_GOOGLE_include_directive : require
@@ -39,13 +39,14 @@ vec2 change_of(uvec2 stratum, inout uvec2 counts) {
     at.position = kept.position;
     at.shading_normal = unpack_normal(kept.shading_normal);
     at.geometric_normal = unpack_normal(kept.geometric_normal);
+    // Also where it has moved to another cluster's row: by the same list the same numbers draw the same lights.
     at.row = kept.row;
     Instance instance = FC.instances.at[object.y];
+    if (instance.moves != 0) take_along(instance, at);
     if (deforms(object.x)) {
+        // As the pixel's point moves; how it turns is not asked.
         Hit seen = Hit(0.0, object.x, object.y, unpackUnorm2x16(object.z));
-        at.position += imageLoad(gbuffer_position, p).xyz - old_position_of(instance, seen);
-    } else if (instance.moves != 0) {
-        take_along(instance, at);
+        at.position = kept.position + (position_of(instance, seen) - old_position_of(instance, seen));
     }
     float now;
     if (FC.reservoirs_used != 0) {

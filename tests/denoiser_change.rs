@@ -18,6 +18,7 @@ use q3rays::render::settings::{AmbientLight, Settings};
 use q3rays::scene::Scene;
 use q3rays::scene::bvh::BvhQuality;
 use q3rays::scene::camera::Camera;
+use q3rays::scene::clock::Clock;
 use q3rays::scene::entity_geometry::EntityState;
 use q3rays::scene::lights::point_light;
 use q3rays::scene::records::Light;
@@ -27,10 +28,12 @@ const SIZE: (u32, u32) = (160, 90);
 const BEFORE: u32 = 24;
 const MOST: u32 = 64;
 
-/// A box with a lamp under its ceiling, and below that a board that a door carries.
-fn board() -> Scene {
-    let script = "textures/fixture/board\n{\n\t{\n\t\tmap $lightmap\n\t}\n\t{\n\t\tmap $whiteimage\n\t\tblendFunc filter\n\t}\n}\n";
-    scene(&boxed("board", script, |map, _| {
+/// A box with a lamp under its ceiling, and below that a board that `carrier` carries; `deform`: a line of its script.
+fn board(deform: &str, carrier: Entity) -> Scene {
+    let script = format!(
+        "textures/fixture/board\n{{\n{deform}\t{{\n\t\tmap $lightmap\n\t}}\n\t{{\n\t\tmap $whiteimage\n\t\tblendFunc filter\n\t}}\n}}\n"
+    );
+    scene(&boxed("board", &script, |map, _| {
         let paint = Paint {
             shader: map.shader("textures/fixture/board", surface_flags::NODLIGHT, content_flags::SOLID),
             mapping: Mapping::Fit,
@@ -41,10 +44,7 @@ fn board() -> Scene {
             contents: paint.shader,
             carves: false,
         };
-        let door = Entity::new("func_door")
-            .with("origin", "140 128 150")
-            .with("angle", "-1");
-        map.brush_model(vec![solid], door);
+        map.brush_model(vec![solid], carrier.with("origin", "140 128 150"));
         map.entity(Entity::light(Vec3::new(140.0, 128.0, 240.0), 300.0, [1.0; 3]));
         map.entity(Entity::light(Vec3::new(230.0, 20.0, 100.0), 40.0, [1.0; 3]));
     }))
@@ -73,12 +73,17 @@ struct Shown<'a> {
     camera: Camera,
     lights: &'a [Light],
     entities: &'a [EntityState],
+    /// The scene's time.
+    clock: Clock,
 }
 
 fn input<'a>(shown: Shown<'a>, settings: &Settings, index: u32, accumulated: u32) -> FrameInput<'a> {
     FrameInput {
         camera: shown.camera,
-        settings: *settings,
+        settings: Settings {
+            clock: shown.clock,
+            ..*settings
+        },
         lights: shown.lights,
         polygons: &[],
         entities: shown.entities,
@@ -128,18 +133,19 @@ fn mean(image: &[[f32; 3]], region: &[usize]) -> f64 {
 /// Pixels to look at, by the truth before and after.
 type Region = fn(&[[f32; 3]], &[[f32; 3]]) -> Vec<usize>;
 
-/// Frames after the last of `steps` until the region's mean is within 10% of the new truth and stays there for 8 frames.
-fn frames_to_follow(renderer: &GpuRenderer, steps: &[Shown<'_>], gradients: bool, region: Region) -> u32 {
+/// Frames after the last of `steps` until the region's mean is within 10% of the new truth and stays there for 8 frames;
+/// none if that takes longer than is waited for.
+fn frames_to_follow(renderer: &GpuRenderer, steps: &[Shown<'_>], settings: &Settings, region: Region) -> Option<u32> {
     let (first, last) = (steps[0], steps[steps.len() - 1]);
     let (before, after) = (truth(renderer, first), truth(renderer, last));
     let region = region(&before, &after);
     assert!(region.len() > 200, "{} pixels change", region.len());
     let wanted = mean(&after, &region);
-    let settings = settings(gradients);
+    assert!(wanted > 0.0, "nothing lights the region");
     let mut view = renderer.view(SIZE).unwrap();
     let mut index = 0;
     let mut show = |shown: Shown<'_>| {
-        renderer.frame(&mut view, &input(shown, &settings, index, 0)).unwrap();
+        renderer.frame(&mut view, &input(shown, settings, index, 0)).unwrap();
         index += 1;
         (mean(&radiance(&view).unwrap(), &region) / wanted - 1.0).abs() < 0.1
     };
@@ -151,13 +157,13 @@ fn frames_to_follow(renderer: &GpuRenderer, steps: &[Shown<'_>], gradients: bool
     }
     let good: Vec<bool> = (0..MOST).map(|_| show(last)).collect();
     let held = good.windows(8).position(|w| w.iter().all(|g| *g));
-    held.map_or(u32::MAX, |frames| frames as u32 + 1)
+    held.map(|frames| frames as u32 + 1)
 }
 
 #[test]
 fn what_changes_is_followed_within_four_frames_with_gradients() {
     with_device(|device| {
-        let scene = board();
+        let scene = board("", Entity::new("func_door").with("angle", "-1"));
         let gpu = SceneGpu::new(device, &scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
         let renderer = GpuRenderer::new(&gpu).unwrap();
         let number = scene.entities.iter().position(|e| e.class() == "func_door").unwrap() as u32;
@@ -176,6 +182,7 @@ fn what_changes_is_followed_within_four_frames_with_gradients() {
             camera,
             lights,
             entities,
+            clock: Clock::default(),
         };
         let (aside, past, down) = (along(Vec3::Y * 10.0), along(Vec3::Y * 5.0), along(Vec3::NEG_Z * 8.0));
         let slides: Vec<_> = aside.iter().map(|places| shown(view(), &[], &places[..])).collect();
@@ -201,11 +208,66 @@ fn what_changes_is_followed_within_four_frames_with_gradients() {
             ("a board moves to a lamp in 8 frames", sinks, middle),
         ];
         for (name, steps, region) in &cases {
-            let with = frames_to_follow(&renderer, steps, true, *region);
-            let without = frames_to_follow(&renderer, steps, false, *region);
-            println!("{name}: {with} frames with gradients, {without} without");
-            assert!(with <= 4, "{name}: {with} frames with gradients");
-            assert!(without > with, "{name}: {without} frames without gradients");
+            follows(&renderer, name, steps, &settings(true), *region);
+        }
+    });
+}
+
+/// Fails if changes are not followed within four frames with gradients, or are without.
+fn follows(renderer: &GpuRenderer, name: &str, steps: &[Shown<'_>], settings: &Settings, region: Region) {
+    let with = frames_to_follow(renderer, steps, settings, region);
+    let without = Settings {
+        gradients: false,
+        ..*settings
+    };
+    let without = frames_to_follow(renderer, steps, &without, region);
+    println!("{name}: {with:?} frames with gradients, {without:?} without");
+    let with = with.filter(|n| *n <= 4);
+    assert!(with.is_some(), "{name}: not followed with gradients");
+    assert!(
+        without.is_none_or(|n| Some(n) > with),
+        "{name}: followed as soon without gradients"
+    );
+}
+
+#[test]
+fn what_turns_or_deforms_is_followed_with_and_without_reused_samples() {
+    // Half a second in eight frames: the board turns by 60° about an axis that lies across its lower face, or sinks by 64 units.
+    let turning = Entity::new("func_rotating")
+        .with("spawnflags", "4")
+        .with("speed", "120");
+    let sinking = "\tdeformVertexes move 0 0 -128 sawtooth 0 1 0 1\n";
+    let near = [point_light(Vec3::new(140.0, 226.0, 100.0), 200.0, Vec3::ONE)];
+    let below = [point_light(Vec3::new(140.0, 90.0, 30.0), 200.0, Vec3::ONE)];
+    let cases = [
+        ("a board turns", board("", turning), &near),
+        ("a board deforms", board(sinking, Entity::new("func_static")), &below),
+    ];
+    with_device(|device| {
+        for (name, scene, lights) in &cases {
+            let gpu = SceneGpu::new(device, scene, Backend::Bvh, BvhQuality::Balanced).unwrap();
+            let renderer = GpuRenderer::new(&gpu).unwrap();
+            let step = |i: u32| Shown {
+                camera: view_of_board(128.0, 14.0),
+                lights: &lights[..],
+                entities: &[],
+                clock: Clock::from_seconds(f64::from(i) / 16.0),
+            };
+            let steps: Vec<_> = (0..=8).map(step).collect();
+            for reuse_denoised in [true, false] {
+                let settings = Settings {
+                    reuse_denoised,
+                    ..settings(true)
+                };
+                let reused = if reuse_denoised { "with" } else { "without" };
+                follows(
+                    &renderer,
+                    &format!("{name}, {reused} reused samples"),
+                    &steps,
+                    &settings,
+                    middle,
+                );
+            }
         }
     });
 }
