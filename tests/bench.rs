@@ -1,5 +1,6 @@
 //! The benchmarks as a user calls them: what they write, that they go on where they were interrupted, and comparisons of runs.
 
+use q3rays::output::exr_file;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -125,4 +126,57 @@ fn errors_are_measured_and_kept() {
     );
     done(&call);
     assert_eq!(json(&folder.path().join("data.json"))["views"][0], *view);
+}
+
+/// What the benchmarks of shown frames measure is of the images that they write, and denoised frames are nearer to the truth.
+#[test]
+fn shown_frames_are_measured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("d.json");
+    let (path, pictures) = (file.to_str().expect("text"), folder.path().join("pictures"));
+    let call = |name| [name, "showcase", "--size", "32x18", "--references", "8", "--json", path];
+    let told = done(
+        &[
+            &call("denoiser")[..],
+            &["--spawns", "1", "--pictures", pictures.to_str().expect("text")],
+        ]
+        .concat(),
+    );
+    let report = json(&file);
+    let view = &report["views"][0];
+    let figure = |images: &Value, name: &str| images[name].as_f64().expect("a figure");
+    let [raw, still, moved] = [&view["raw"], &view["still"][1], &view["moved"]].map(|f| figure(f, "rel_mse_trimmed"));
+    assert!(still < raw / 4.0 && moved < raw, "{raw} {still} {moved}");
+    let mean = |name: &str| {
+        let written = exr_file::read(&pictures.join(format!("showcase_0_{name}.exr")));
+        let (width, height, planes) = written.expect("an image");
+        assert_eq!((width, height, planes.len()), (32, 18, 3));
+        let values = planes.iter().flat_map(|(_, v)| v).map(|v| f64::from(*v));
+        values.sum::<f64>() / f64::from(width * height * 3)
+    };
+    let truth = 0.5 * (mean("reference_a") + mean("reference_b"));
+    for (name, images) in [
+        ("raw128", &view["raw_many"]),
+        ("still64", &view["still"][1]),
+        ("moved64", &view["moved"]),
+    ] {
+        assert!(
+            (mean(name) / truth - figure(images, "mean_ratio")).abs() < 1e-6,
+            "{name}: {told}"
+        );
+    }
+    done(&call("motion"));
+    let walk = &json(&file)["maps"][0];
+    assert!(
+        figure(walk, "flip") > 0.0 && walk["frames"].as_array().is_some_and(|f| f.len() > 20),
+        "{walk}"
+    );
+    assert!(
+        walk["frames"]
+            .as_array()
+            .expect("frames")
+            .iter()
+            .all(|f| figure(f, "flip") < 1.0)
+    );
+    assert_eq!(done(&call("culling")).matches("| showcase (").count(), 12);
 }

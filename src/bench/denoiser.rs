@@ -95,11 +95,14 @@ fn times(stage: &mut Stage, path: &dyn Fn(u32) -> Camera) -> Result<BTreeMap<Str
         .collect())
 }
 
+/// Images that a view's figures are of, by name.
+pub type Looked = Vec<(&'static str, Pixels)>;
+
 /// Measures a view.
 ///
 /// # Errors
 /// [`RenderError`] of the device.
-pub fn run(stage: &mut Stage, map: &str, spawn: usize, camera: &Camera) -> Result<ViewReport, RenderError> {
+pub fn run(stage: &mut Stage, map: &str, spawn: usize, camera: &Camera) -> Result<(ViewReport, Looked), RenderError> {
     let raw_one = raw(stage, camera, 1, RUNS)?;
     let raw_many = raw(stage, camera, RAW, 1)?;
     let mut still = [Vec::new(), Vec::new()];
@@ -131,7 +134,7 @@ pub fn run(stage: &mut Stage, map: &str, spawn: usize, camera: &Camera) -> Resul
         let figures: Vec<Figures> = images.iter().map(|i| stage.figures(i, references)).collect();
         Figures::mean(&figures)
     };
-    Ok(ViewReport {
+    let report = ViewReport {
         map: map.to_owned(),
         spawn,
         references: truth.samples * 2,
@@ -142,5 +145,18 @@ pub fn run(stage: &mut Stage, map: &str, spawn: usize, camera: &Camera) -> Resul
         moved: stage.figures(&moved, references),
         passes: times(stage, &|_| *camera)?,
         moving_passes: times(stage, &path)?,
-    })
+    };
+    let [still_8, still_64] = still;
+    let [reference_a, reference_b] = truth.references.images;
+    let first = |images: Vec<Pixels>| images.into_iter().next().unwrap_or_default();
+    let looked = vec![
+        ("raw1", first(raw_one)),
+        ("raw128", first(raw_many)),
+        ("still8", still_8),
+        ("still64", still_64),
+        ("moved64", moved),
+        ("reference_a", reference_a),
+        ("reference_b", reference_b),
+    ];
+    Ok((report, looked))
 }

@@ -49,7 +49,7 @@ enum What {
     /// What acceleration structures cost to build, refit and upload
     Structures(structures::StructuresArgs),
     /// What the denoiser makes of one light sample per pixel, and its times
-    Denoiser(pictures::PictureArgs),
+    Denoiser(pictures::DenoiserArgs),
     /// A walk with sudden turns and a jump to another place, frame by frame
     Motion(pictures::PictureArgs),
     /// What culling lights does to denoised frames

@@ -10,7 +10,7 @@ use crate::bench::stage::Stage;
 use crate::bench::{culling, denoiser, motion};
 use crate::console::Cvars;
 use crate::console::settings::settings;
-use crate::output::{atomic, stdout};
+use crate::output::{atomic, exr_file, stdout};
 use crate::render::scene_gpu::SceneGpu;
 use crate::scene::Scene;
 use crate::scene::bvh::BvhQuality;
@@ -50,6 +50,15 @@ pub(super) struct PictureArgs {
     json: Option<PathBuf>,
 }
 
+#[derive(clap::Args)]
+pub(super) struct DenoiserArgs {
+    #[command(flatten)]
+    common: PictureArgs,
+    /// Also write the images that are measured into this folder, as MAP_SPAWN_NAME.exr
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+}
+
 /// Loads the maps one by one and hands each to `measure` on a stage of its own. `name` is the benchmark's.
 fn each_map(
     common: &Common,
@@ -73,14 +82,27 @@ fn each_map(
 }
 
 /// Measures still and moving views.
-pub(super) fn denoiser(common: &Common, cvars: &Cvars, args: &PictureArgs) -> CliResult {
+pub(super) fn denoiser(common: &Common, cvars: &Cvars, asked: &DenoiserArgs) -> CliResult {
+    let args = &asked.common;
+    if let Some(folder) = &asked.pictures {
+        // Before hours of measuring.
+        atomic::create_parent(&folder.join("x.exr")).map_err(CliError::failed)?;
+    }
     let mut views = Vec::new();
     let (device, driver) = each_map(common, cvars, args, "denoiser", |map, scene, stage| {
         for spawn in 0..args.spawns.min(scene.spawns.len()) {
             let view = at_spawn(scene, Some(spawn), FOV)?;
-            views.push(denoiser::run(stage, map, spawn, &view).map_err(CliError::failed)?);
+            let (report, looked) = denoiser::run(stage, map, spawn, &view).map_err(CliError::failed)?;
+            views.push(report);
             // What is measured is kept, also where a later view fails.
             keep(args.json.as_deref(), &views)?;
+            if let Some(folder) = &asked.pictures {
+                for (name, pixels) in looked {
+                    let file = folder.join(format!("{map}_{spawn}_{name}.exr"));
+                    let (width, height) = args.size;
+                    exr_file::write(&file, width, height, exr_file::rgb(&pixels), &[]).map_err(CliError::failed)?;
+                }
+            }
         }
         Ok(())
     })?;
